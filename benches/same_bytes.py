@@ -36,7 +36,7 @@ WAYS = {
     "f16-omp": ["--tol", "0.1", "--pursuit", "omp", "--seed", "7"],
     "f32": ["--layout", "f32", "--tol", "0.05"],
     "paper": ["--layout", "paper", "--tol", "0.1"],
-    "max-nnz": ["--max-nnz", "4"],
+    "max-nonzeros": ["--max-nonzeros", "4"],
 }
 
 

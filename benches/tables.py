@@ -40,7 +40,7 @@ def reached(binary, model, file):
     """Mean PSNR of `file` against `model`."""
     cameras = cameras_of(model)
     given = ["--cameras", cameras, "--split", "test", "--width", WIDTH]
-    views = given if cameras else ["--scene", "object", "--orbit", ORBIT, "--width", ORBIT_WIDTH]
+    views = given if cameras else ["--views", "object", "--orbit", ORBIT, "--width", ORBIT_WIDTH]
     told = run(binary, "compare", model, file, *views, "--device", "cpu", "--json", "--quiet")
     return json.loads(told)["psnr"]["mean"]
 

@@ -149,11 +149,11 @@ def check_object(meta, key, numbers, target):
     if key not in meta:
         return
     o = parse_json(meta[key])
-    check(isinstance(o, dict) and set(o) == set(numbers) | {"views", "cameras"} | ({"target"} if target else set()),
+    check(isinstance(o, dict) and set(o) == set(numbers) | {"views", "cameras"} | ({"kind"} if target else set()),
           f"bad members of {key}")
     check(all(type(o[k]) in (int, float) and math.isfinite(o[k]) for k in numbers), f"bad numbers of {key}")
     check(type(o["views"]) is int and o["views"] >= 0 and type(o["cameras"]) is bool, f"bad views or cameras of {key}")
-    check(not target or o["target"] in ("psnr", "min-psnr", "size"), f"bad target of {key}")
+    check(not target or o["kind"] in ("psnr", "min-psnr", "size"), f"bad kind of {key}")
 
 
 def offset_of(meta):
@@ -180,7 +180,7 @@ def check_packed_metadata(meta):
     comments = parse_json(meta.get("comments", "[]"))
     check(isinstance(comments, list) and all(isinstance(c, str) for c in comments), "bad metadata comments")
     offset_of(meta)
-    check_object(meta, "promise", ("asked", "mean_psnr", "min_psnr"), True)
+    check_object(meta, "target", ("asked", "mean_psnr", "min_psnr"), True)
     check_object(meta, "reached", ("judged_psnr", "mean_psnr", "min_psnr"), False)
     return degree
 

@@ -81,7 +81,7 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
         return packed_in_parts(splats, &options, decibels);
     }
     let sensitivity = if how & 4 == 0 {
-        Sensitivity::heuristic(&splats.geometry)
+        Sensitivity::guess(&splats.geometry)
     } else {
         let cameras = orbit(&splats.geometry, 2, SIDES.0, SIDES.1);
         lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &Silent).expect("measured")

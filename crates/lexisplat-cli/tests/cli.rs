@@ -51,7 +51,7 @@ fn codes_draw_as_the_decompressed_scene_does() {
     let folder = Folder::few();
     folder.run(&["compress", "scene.ply", "--quiet"]);
     folder.run(&["decompress", "scene.lexi", "-o", "back.ply"]);
-    let small = ["--orbit", "3", "--width", "120", "--scene", "object"];
+    let small = ["--orbit", "3", "--width", "120", "--views", "object"];
     let score = folder.json(&[&["compare", "back.ply", "scene.lexi"], &small[..]].concat());
     if score["identical"] != Value::Bool(true) {
         assert!(score["psnr"]["min"].as_f64().unwrap() >= 70.0, "{score}");
@@ -345,9 +345,10 @@ fn extra_properties_are_kept_or_dropped() {
 #[test]
 fn a_cap_on_nonzeros_lifts_the_promise() {
     let folder = Folder::new();
-    let report = folder.json(&["compress", "scene.ply", "--max-nnz", "2"]);
+    let report = folder.json(&["compress", "scene.ply", "--max-nonzeros", "2"]);
     assert!(report["tol"].is_null() && report["mean_nonzeros"].as_f64().unwrap() <= 2.0);
-    let report = folder.json(&["compress", "scene.ply", "--max-nnz", "2", "--tol", "0.05", "--overwrite"]);
+    let report =
+        folder.json(&["compress", "scene.ply", "--max-nonzeros", "2", "--tol", "0.05", "--overwrite"]);
     assert!(report["over_tolerance"].as_u64().unwrap() > 0);
 }
 

@@ -51,7 +51,7 @@ fn the_page_is_small_and_the_packed_file_leads() {
 /// Asserts that README's figures of a file are those of `file` within 3 % of the bytes and 0.2 dB. `benches/tables.py` makes
 /// them anew.
 fn same_as_said(name: &str, folder: &Folder, [scene, file]: [&Path; 2], bytes: f64, decibels: f64) {
-    let views = ["--scene", "object", "--orbit", "12", "--width", "480", "--device", "cpu"];
+    let views = ["--views", "object", "--orbit", "12", "--width", "480", "--device", "cpu"];
     let [a, b] = [scene, file].map(|path| path.to_str().unwrap());
     let score = folder.json(&[&["compare", a, b], &views[..]].concat());
     let found = (file.metadata().unwrap().len() as f64, score["psnr"]["mean"].as_f64().unwrap());

@@ -25,7 +25,7 @@ const FEW: usize = 300;
 const COMMANDS: [&str; 13] = [
     "compress many.ply -o f16.lexi --tol 0.08 --sample 1000 --atoms 40 --save-dictionary dictionary.lexi",
     "compress many.ply -o f32.lexi --layout f32 --tol 0.1 --pursuit omp --dictionary dictionary.lexi",
-    "compress many.ply -o paper.lexi --layout paper --max-nnz 6 --dictionary dictionary.lexi",
+    "compress many.ply -o paper.lexi --layout paper --max-nonzeros 6 --dictionary dictionary.lexi",
     "compress few.ply -o preset.lexi --preset high --keep-order",
     "compress few.ply -o aimed.lexi --psnr 33 --cameras cameras.json",
     "compress few.ply -o sized.lexi --size 9kB --keep-all --cameras cameras.json",

@@ -138,7 +138,7 @@ fn cameras_of_another_scene_are_told() {
     assert!(error.starts_with("warning: views: 2 of 2 views"), "{error}");
 }
 
-const SMALL: [&str; 8] = ["--tol", "0.1,0.3", "--presets", "small", "--max-nnz", "1", "--device", "cpu"];
+const SMALL: [&str; 8] = ["--tol", "0.1,0.3", "--presets", "small", "--max-nonzeros", "1", "--device", "cpu"];
 
 #[test]
 fn a_sweep_leaves_tables_figures_and_a_page() {

@@ -10,7 +10,7 @@ const LITTLE: [&str; 2] = ["--memory", "100kB"];
 fn a_scene_larger_than_memory_is_packed_in_parts() {
     let folder = Folder::new();
     let report = folder.json(&[&["compress", "scene.ply", "--keep-order"], &LITTLE[..]].concat());
-    assert_eq!((&report["importance"], &report["layout"]), (&"views".into(), &"packed".into()));
+    assert_eq!((&report["sensitivity"], &report["layout"]), (&"views".into(), &"packed".into()));
     let bytes = std::fs::read(folder.path("scene.lexi")).unwrap();
     assert_eq!(report["file_bytes"], bytes.len());
     let listed = report["attribute_bytes"].as_object().unwrap().values().map(|v| v.as_f64().unwrap());
@@ -43,7 +43,7 @@ fn a_scene_larger_than_memory_is_packed_in_parts() {
 fn what_shows_can_be_guessed_whatever_the_memory() {
     let folder = Folder::new();
     let report = folder.json(&["compress", "scene.ply", "--guess", "-o", "much.lexi"]);
-    assert_eq!((&report["importance"], &report["look_seconds"]), (&"guess".into(), &0.0.into()));
+    assert_eq!((&report["sensitivity"], &report["look_seconds"]), (&"guess".into(), &0.0.into()));
     let text =
         folder.run(&[&["compress", "scene.ply", "--guess", "-o", "little.lexi"], &LITTLE[..]].concat());
     assert!(text.contains("guessed"), "{text}");

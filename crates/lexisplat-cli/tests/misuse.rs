@@ -151,7 +151,7 @@ fn negative_numbers_are_out_of_range_not_unknown_options() {
         ("--size", USAGE, "a size such as"),
         ("--memory", USAGE, "a size such as"),
         ("--atoms", USAGE, "a whole number, at least 0"),
-        ("--max-nnz", USAGE, "a whole number from 0 to 255"),
+        ("--max-nonzeros", USAGE, "a whole number from 0 to 255"),
         ("--threads", USAGE, "a whole number, at least 0"),
     ] {
         let error = folder.fail(&["compress", "scene.ply", option, "-5"], code);

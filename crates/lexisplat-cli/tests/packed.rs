@@ -5,11 +5,11 @@ use crate::folder::{Folder, lexisplat, read};
 use serde_json::Value;
 
 /// Few views, small: enough to tell qualities apart.
-const SMALL: [&str; 6] = ["--scene", "object", "--orbit", "4", "--width", "160"];
+const SMALL: [&str; 6] = ["--views", "object", "--orbit", "4", "--width", "160"];
 /// Packs the scene of [`Folder::few`] by its cameras.
 const BY_CAMERAS: [&str; 4] = ["compress", "scene.ply", "--cameras", "cameras.json"];
 /// An orbit as README's table has it.
-const AROUND: [&str; 6] = ["--scene", "object", "--orbit", "12", "--width", "480"];
+const AROUND: [&str; 6] = ["--views", "object", "--orbit", "12", "--width", "480"];
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
@@ -37,7 +37,7 @@ fn presets_are_ordered_and_the_default_is_balanced() {
         (last_bytes, last_psnr) = (on_disk, psnr);
     }
     let default = folder.json(&["compress", "scene.ply"]);
-    assert!(default["promise"].is_null() && default["tol"].is_null());
+    assert!(default["target"].is_null() && default["tol"].is_null());
     let file = |name: &str| std::fs::read(folder.path(name)).unwrap();
     assert!(file("scene.lexi") == file("balanced.lexi"));
     folder.json(&["compress", "scene.ply", "-o", "exact.lexi", "--layout", "f16"]);
@@ -49,18 +49,18 @@ fn a_quality_is_reached_and_recorded() {
     let folder = Folder::few();
     for (option, key) in [("--psnr", "judged_psnr"), ("--min-psnr", "min_psnr")] {
         let report = folder.json(&["compress", "scene.ply", "--no-cameras", option, "38", "--overwrite"]);
-        let promise = &report["promise"];
-        assert_eq!((&promise["target"], &promise["asked"]), (&option[2..].into(), &38.0.into()));
+        let target = &report["target"];
+        assert_eq!((&target["kind"], &target["asked"]), (&option[2..].into(), &38.0.into()));
         let reached = &report["reached"];
         assert!((38.0..38.6).contains(&number(&reached[key])), "{report}");
         // Generated views are judged by the worst quarter of them.
         assert!(number(&reached["judged_psnr"]) < number(&reached["mean_psnr"]), "{report}");
         for key in ["mean_psnr", "min_psnr", "views", "cameras"] {
-            assert_eq!(promise[key], reached[key], "{key}");
+            assert_eq!(target[key], reached[key], "{key}");
         }
-        assert_eq!(promise["cameras"], false);
+        assert_eq!(target["cameras"], false);
         let info = folder.json(&["info", "scene.lexi"]);
-        assert_eq!(&info["lexi"]["promise"], promise);
+        assert_eq!(&info["lexi"]["target"], target);
         assert_eq!(&info["lexi"]["reached"], reached);
         assert!(folder.run(&["info", "scene.lexi"]).contains("dB at worst"));
     }
@@ -93,10 +93,10 @@ fn the_kind_of_scene_can_be_given() {
         std::fs::read(folder.path("scene.lexi")).unwrap()
     };
     let auto = file(&["--no-cameras"]);
-    assert!(auto == file(&["--scene", "auto"]));
-    assert!(auto != file(&["--scene", "room"]));
-    folder.fail(&["compress", "scene.ply", "--scene", "room", "--cameras", "cameras.json"], 2);
-    folder.fail(&["compress", "scene.ply", "--scene", "room", "--guess"], 2);
+    assert!(auto == file(&["--views", "auto"]));
+    assert!(auto != file(&["--views", "room"]));
+    folder.fail(&["compress", "scene.ply", "--views", "room", "--cameras", "cameras.json"], 2);
+    folder.fail(&["compress", "scene.ply", "--views", "room", "--guess"], 2);
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn a_size_is_never_exceeded() {
         let bytes = folder.path("scene.lexi").metadata().unwrap().len();
         assert_eq!(report["file_bytes"], bytes);
         assert!(bytes <= most && bytes > most * 9 / 10, "{bytes} of {most}");
-        assert!(number(&report["promise"]["mean_psnr"]) > 20.0);
+        assert!(number(&report["target"]["mean_psnr"]) > 20.0);
     }
     let ply = folder.path("scene.ply").metadata().unwrap().len();
     folder.run(&[&BY_CAMERAS[..], &["--ratio", "12", "--overwrite"]].concat());
@@ -169,7 +169,7 @@ fn given_cameras_are_searched_with() {
         .collect();
     std::fs::write(folder.path("cameras.json"), Value::from(cameras).to_string()).unwrap();
     let report = folder.json(&["compress", "scene.ply", "--psnr", "40", "--cameras", "cameras.json"]);
-    assert_eq!(report["promise"]["cameras"], true);
+    assert_eq!(report["target"]["cameras"], true);
     let score = folder.json(&["compare", "scene.ply", "scene.lexi", "--cameras", "cameras.json"]);
     let mean = number(&score["psnr"]["mean"]);
     assert!((39.0..41.5).contains(&mean), "{mean}");

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use crate::Looked;
     use crate::drawing::{DrawOptions, draw_views};
-    use crate::views::SceneKind;
+    use crate::views::Viewpoints;
 
     /// Changes of colours, opacities and sizes make up for what is missing, in views that they are not fitted to.
     #[test]
@@ -138,7 +138,7 @@ mod tests {
         let splats = scene(&SampleOptions::new(3000, 1));
         let mut cpu = Renderer::cpu();
         let Looked { views, sensitivity } =
-            Looked::at(&mut cpu, &splats, None, SceneKind::Auto, &Silent).unwrap();
+            Looked::at(&mut cpu, &splats, None, Viewpoints::Auto, &Silent).unwrap();
         let options = PackOptions::default().with_layers_from(1);
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(packer.step_for(34.0), true, &Silent).unwrap();

@@ -12,7 +12,7 @@ pub struct RecordReport {
     /// `None` for a packed file.
     pub pursuit: Option<&'static str>,
     pub tol: Option<f64>,
-    pub max_nnz: Option<u8>,
+    pub max_nonzeros: Option<u8>,
     pub seed: u64,
     pub max_residual: f64,
     pub rms_residual: f64,
@@ -24,7 +24,7 @@ impl From<&Record> for RecordReport {
         Self {
             pursuit: record.pursuit.map(Pursuit::name),
             tol: record.tolerance,
-            max_nnz: record.max_nonzeros,
+            max_nonzeros: record.max_nonzeros,
             seed: record.seed,
             max_residual: record.max_residual,
             rms_residual: record.rms_residual,

@@ -60,7 +60,7 @@ mod tests {
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
-    use crate::views::SceneKind;
+    use crate::views::Viewpoints;
     use crate::{Judge, Looked};
 
     #[test]
@@ -75,12 +75,12 @@ mod tests {
         let all = scene(&SampleOptions::new(1000, 3));
         let mut cpu = Renderer::cpu();
         let Looked { views, sensitivity } =
-            Looked::at(&mut cpu, &all, None, SceneKind::Auto, &Silent).unwrap();
+            Looked::at(&mut cpu, &all, None, Viewpoints::Auto, &Silent).unwrap();
         let fit = Fit::to(&all, views.fitting(&all), views.are_given(), &Silent).unwrap();
         let made = at_most(400, &all, sensitivity, &views, &mut cpu, &fit, &Silent).unwrap();
         assert_eq!((made.0.len(), made.1.len()), (400, 400));
         let mut guessed = all.clone();
-        guessed.retain(&all_but(600, &Sensitivity::heuristic(&all.geometry).opacity));
+        guessed.retain(&all_but(600, &Sensitivity::guess(&all.geometry).opacity));
         assert_eq!(guessed.len(), 400);
         let mut judge = Judge::new(cpu, &all, &views.some_judging(12), false, &Silent).unwrap();
         let [made, guessed] = [&made.0, &guessed].map(|scene| judge.score(scene, &Silent).unwrap().mean);

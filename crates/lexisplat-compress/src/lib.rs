@@ -71,8 +71,8 @@ pub use report::{CompressionReport, SensitivitySource, overshoot, uncertain_by};
 pub use signs::shows_almost_nothing;
 pub use target::Target;
 pub use views::{
-    ChosenViews, DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SceneKind, SplitFilter, View,
-    ViewOptions, cameras_beside, choose_views, find_views, photo, read_beside,
+    ChosenViews, DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SplitFilter, View, ViewOptions,
+    Viewpoints, cameras_beside, choose_views, find_views, photo, read_beside,
 };
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use lexisplat_render::{Camera, Renderer};
 use crate::error::{Error, Result};
 use crate::packing_views::Looked;
 use crate::target::Target;
-use crate::views::SceneKind;
+use crate::views::Viewpoints;
 
 /// Bytes of memory that packing a whole scene takes: so many, and tenths of a byte for each byte of its source. A PLY of 99 MB
 /// took 540 MB, one of 793 MB 2,320 MB, without the pages of the file itself (docs/results/sizes.md).
@@ -36,7 +36,7 @@ pub enum Compression {
     /// Everything is quantised and entropy-coded without drawing the scene: what shows follows from each
     /// Gaussian alone. Several times faster than [`Self::Packed`], for larger files of the same quality. The
     /// scene is never whole in memory.
-    Heuristic(Preset, PackOptions),
+    Guessed(Preset, PackOptions),
 }
 
 impl Compression {
@@ -96,14 +96,14 @@ impl From<Target> for Quality {
 /// How to pack a scene by what shows in views of it.
 ///
 /// A large scene, and one that needs more than the memory allowed, is packed part by part, each part by its own views, if no
-/// choice needs the whole scene: cameras, a kind of scene, a limit of Gaussians, and targets other than a mean PSNR do.
+/// choice needs the whole scene: cameras, viewpoints, a limit of Gaussians, and targets other than a mean PSNR do.
 #[derive(Debug, Clone)]
 pub struct Packing {
     pub(crate) quality: Quality,
     pub(crate) options: PackOptions,
     pub(crate) cameras: Option<Vec<Camera>>,
     pub(crate) likely_cameras: Option<Vec<Camera>>,
-    pub(crate) kind: SceneKind,
+    pub(crate) viewpoints: Viewpoints,
     pub(crate) gpu: Option<Gpu>,
     pub(crate) looked: Option<Arc<Looked>>,
     pub(crate) max_gaussians: Option<usize>,
@@ -125,7 +125,7 @@ impl Packing {
             options: PackOptions::default(),
             cameras: None,
             likely_cameras: None,
-            kind: SceneKind::Auto,
+            viewpoints: Viewpoints::Auto,
             gpu: None,
             looked: None,
             max_gaussians: None,
@@ -148,7 +148,7 @@ impl Packing {
     }
 
     /// Measures and judges by these cameras if they seem to belong to the scene, as [`Self::with_cameras`] does, and otherwise
-    /// as if there were none. Nothing but the default kind of scene goes with them, and a scene that is packed part by part does
+    /// as if there were none. Nothing but the default viewpoints go with them, and a scene that is packed part by part does
     /// without. The report says whether they were used: [`ReachedRecord::cameras`](lexisplat::packed::ReachedRecord::cameras).
     #[must_use]
     pub fn with_likely_cameras(self, cameras: Vec<Camera>) -> Self {
@@ -158,8 +158,8 @@ impl Packing {
     /// Measures and judges by views around an object or inside a room. By default views like photographs are looked
     /// for. Cameras that are given count more.
     #[must_use]
-    pub fn with_scene_kind(self, kind: SceneKind) -> Self {
-        Self { kind, ..self }
+    pub fn with_viewpoints(self, viewpoints: Viewpoints) -> Self {
+        Self { viewpoints, ..self }
     }
 
     /// Draws on `gpu`, or on the processor if there is none. The file records a GPU, because its results are not
@@ -247,7 +247,7 @@ impl Packing {
         match self.quality {
             Quality::Target(target) if !matches!(target, Target::MeanPsnr(_)) => Some(target.name()),
             _ if self.cameras.is_some() => Some("cameras"),
-            _ if self.kind != SceneKind::Auto => Some("scene"),
+            _ if self.viewpoints != Viewpoints::Auto => Some("views"),
             _ if self.max_gaussians.is_some() => Some(MAX_GAUSSIANS),
             _ => self.looked.as_ref().map(|_| "looked"),
         }

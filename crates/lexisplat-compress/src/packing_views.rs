@@ -7,7 +7,7 @@ use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, ob
 use crate::error::{Error, Result};
 use crate::found::{Found, find};
 use crate::sharp_views::sampled;
-use crate::views::{DEFAULT_MAX_WIDTH, SceneKind};
+use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints};
 
 /// Number of generated views that measure. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have
 /// fewer, for a view of so many Gaussians takes long.
@@ -64,7 +64,7 @@ const FITTED_GIVEN: usize = 40;
 const FITTED_AROUND: usize = 8;
 /// Share of the views whose positions are nearest to the one in their middle, which viewpoints are chosen from.
 const USUAL_VIEWS: f32 = 0.67;
-/// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
+/// Weight of the guess in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
 
 /// A number of pixels that grows with a scene.
@@ -91,20 +91,20 @@ pub struct Looked {
 }
 
 impl Looked {
-    /// Looks at `splats` from `cameras`, or from where its `kind` says. `progress` can cancel.
+    /// Looks at `splats` from `cameras`, or from `viewpoints`. `progress` can cancel.
     ///
     /// # Errors
-    /// As [`PackingViews::given`], [`PackingViews::of_kind`] and [`PackingViews::sensitivity`].
+    /// As [`PackingViews::given`], [`PackingViews::generated`] and [`PackingViews::sensitivity`].
     pub fn at(
         renderer: &mut Renderer,
         splats: &Splats,
         cameras: Option<&[Camera]>,
-        kind: SceneKind,
+        viewpoints: Viewpoints,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let views = match cameras {
             Some(cameras) => PackingViews::given(cameras)?,
-            None => PackingViews::of_kind(kind, renderer, splats, progress)?,
+            None => PackingViews::generated(viewpoints, renderer, splats, progress)?,
         };
         let sensitivity = views.sensitivity(renderer, splats, progress)?;
         Ok(Self { views, sensitivity })
@@ -162,22 +162,22 @@ impl PackingViews {
         Ok(Self { measuring, judging: judges, given: false })
     }
 
-    /// Views of `splats` where its `kind` says that photographs were taken: half of those that measure and all that
+    /// Views of `splats` from `viewpoints`: half of the views that measure and all views that
     /// judge are around an object, or inside a room. The other half is from all around.
     ///
     /// # Errors
-    /// As [`Self::found`], which finds the views if the kind is [`SceneKind::Auto`].
-    pub fn of_kind(
-        kind: SceneKind,
+    /// As [`Self::found`], which finds the views if `viewpoints` is [`Viewpoints::Auto`].
+    pub fn generated(
+        viewpoints: Viewpoints,
         renderer: &mut Renderer,
         splats: &Splats,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let [width, height] = GENERATED_SIZE;
-        let views: fn(&Geometry, usize, u32, u32) -> Vec<Camera> = match kind {
-            SceneKind::Auto => return Self::found(renderer, splats, progress),
-            SceneKind::Object => object,
-            SceneKind::Room => interior_views,
+        let views: fn(&Geometry, usize, u32, u32) -> Vec<Camera> = match viewpoints {
+            Viewpoints::Auto => return Self::found(renderer, splats, progress),
+            Viewpoints::Object => object,
+            Viewpoints::Room => interior_views,
         };
         let mut measuring: Vec<Camera> = around(splats).into_iter().step_by(2).collect();
         measuring.extend(views(&splats.geometry, measuring.len(), width, height));
@@ -298,7 +298,7 @@ impl PackingViews {
     }
 
     /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result
-    /// is blended with the heuristic, which stands for all views that are not among these. Reports
+    /// is blended with the guess, which stands for all views that are not among these. Reports
     /// [`Stage::Draw`](lexisplat::Stage::Draw) to `progress`, in views.
     ///
     /// # Errors
@@ -352,7 +352,7 @@ mod tests {
     fn a_scene_is_looked_at_in_its_own_size() {
         let splats = scene(&SampleOptions::new(1500, 3));
         let looked = |splats: &Splats| {
-            Looked::at(&mut Renderer::cpu(), splats, None, SceneKind::Auto, &Silent).unwrap()
+            Looked::at(&mut Renderer::cpu(), splats, None, Viewpoints::Auto, &Silent).unwrap()
         };
         let whole = looked(&splats);
         for (factor, shift) in [(1e-4, 0.0), (0.03, 0.0), (1e4, 0.0), (0.5, 64.0)] {

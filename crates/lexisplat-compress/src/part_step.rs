@@ -66,7 +66,7 @@ mod tests {
         assert!(usual > 0.02 && usual < 50.0, "{usual}");
         // The same file is found from another expectation.
         let packed = |decibels: f64, factor: f64| {
-            let sensitivity = Sensitivity::heuristic(&part.geometry);
+            let sensitivity = Sensitivity::guess(&part.geometry);
             factor * Packer::new(&part, &sensitivity, &PackOptions::default()).unwrap().step_for(decibels)
         };
         assert!(packed(36.0, factor(PackOptions::default(), 36.0)) > 1.2 * packed(40.0, usual));

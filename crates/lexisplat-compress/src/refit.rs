@@ -222,14 +222,14 @@ mod tests {
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
-    use crate::views::SceneKind;
+    use crate::views::Viewpoints;
     use crate::{Judge, Looked};
 
     /// The judged quality of a file of `splats` at one step, and its scene.
     fn made(splats: &Splats, options: &PackOptions) -> (f64, Splats) {
         let mut cpu = Renderer::cpu();
         let Looked { views, sensitivity } =
-            Looked::at(&mut cpu, splats, None, SceneKind::Auto, &Silent).unwrap();
+            Looked::at(&mut cpu, splats, None, Viewpoints::Auto, &Silent).unwrap();
         let packer = Packer::new(splats.clone(), &sensitivity, options).unwrap();
         let fit =
             options.may_change().then(|| Fit::to(splats, views.fitting(splats), false, &Silent).unwrap());

@@ -58,12 +58,11 @@ pub struct CompressionReport {
     #[serde(serialize_with = "map")]
     pub attribute_bytes: Vec<(String, f64)>,
     /// What was asked and reached, if the quality was a target.
-    #[serde(rename = "promise")]
     pub target: Option<TargetRecord>,
     /// What the file shows of the scene, if views judged it.
     pub reached: Option<ReachedRecord>,
     /// What the sensitivity comes from. `None` if the geometry is exact, which needs none.
-    pub importance: Option<SensitivitySource>,
+    pub sensitivity: Option<SensitivitySource>,
     /// The GPU that measured the sensitivity, or `cpu`. `None` if the geometry is exact.
     pub device: Option<String>,
     /// Number of Gaussians of the source that were left out.
@@ -110,7 +109,7 @@ pub fn uncertain_by(reached: &ReachedRecord) -> Option<f64> {
 #[must_use]
 pub fn overshoot(target: &TargetRecord) -> Option<f64> {
     let above = target.mean_psnr - target.min_psnr;
-    (target.target == MIN_PSNR && above > MUCH_ABOVE).then_some(above)
+    (target.kind == MIN_PSNR && above > MUCH_ABOVE).then_some(above)
 }
 
 /// What `judge` says of a file.
@@ -132,8 +131,7 @@ pub enum SensitivitySource {
     /// Views of the scene were drawn.
     Views,
     /// Each Gaussian was judged alone.
-    #[serde(rename = "guess")]
-    Heuristic,
+    Guess,
 }
 
 impl CompressionReport {
@@ -182,7 +180,7 @@ impl CompressionReport {
         head: &PackedHead,
         report: &CompressReport,
         tensors: &[(String, u64)],
-        importance: SensitivitySource,
+        source: SensitivitySource,
     ) -> Self {
         let (gaussians, degree, record) = (head.gaussians, head.degree, &head.record);
         Self {
@@ -190,7 +188,7 @@ impl CompressionReport {
             removed: head.removed,
             target: head.target.clone(),
             reached: head.reached,
-            importance: Some(importance),
+            sensitivity: Some(source),
             device: Some(head.device.as_deref().unwrap_or("cpu").to_owned()),
             ..Self::new(Layout::Packed, gaussians, degree, record, report, tensors)
         }

@@ -16,7 +16,7 @@ use crate::refit::{Fit, Refitting};
 use crate::report::{CompressionReport, SensitivitySource, reached};
 use crate::signs::near_plane_hides;
 use crate::target::{pack_to_preset, pack_to_target};
-use crate::views::SceneKind;
+use crate::views::Viewpoints;
 
 /// Bytes of a Gaussian in a PLY at SH degree 3.
 const PLY_ROW: u64 = 248;
@@ -64,7 +64,7 @@ impl Compression {
                 let done = stream::compress(source, options, *codes, sink, progress)?;
                 CompressionReport::exact(done, Layout::of(*codes, options.values))
             }
-            Self::Heuristic(preset, options) => {
+            Self::Guessed(preset, options) => {
                 in_parts(options, preset.decibels(), None, source, sink, progress)?
             }
             Self::Packed(packing) => packing.run(source, sink, progress)?,
@@ -123,7 +123,7 @@ impl Packing {
         splats: &Splats,
         progress: &dyn Progress,
     ) -> Result<Option<&[Camera]>> {
-        if let (None, SceneKind::Auto, Some(likely)) = (&self.cameras, self.kind, &self.likely_cameras)
+        if let (None, Viewpoints::Auto, Some(likely)) = (&self.cameras, self.viewpoints, &self.likely_cameras)
             && belong(renderer, splats, likely, progress)?
         {
             return Ok(Some(likely));
@@ -152,7 +152,7 @@ impl Packing {
                     drop(splats);
                     return self.in_parts(source, sink, progress);
                 }
-                Looked::at(&mut renderer, &splats, cameras, self.kind, progress)?
+                Looked::at(&mut renderer, &splats, cameras, self.viewpoints, progress)?
             }
         };
         let look_seconds = clock.seconds();

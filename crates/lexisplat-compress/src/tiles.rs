@@ -49,7 +49,7 @@ pub fn code(
 /// The report of a file that was assembled of buckets, which were looked at or `guessed`.
 #[must_use]
 pub fn report(done: &PackedFile, guessed: bool) -> CompressionReport {
-    let origin = if guessed { SensitivitySource::Heuristic } else { SensitivitySource::Views };
+    let origin = if guessed { SensitivitySource::Guess } else { SensitivitySource::Views };
     let report = CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, origin);
     CompressionReport { in_parts: true, ..report }
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::{CompressOptions, Layout, Limits, Progress, Silent, Splats, Stage, lexi, ply};
 use lexisplat_compress::{
-    Compression, CompressionReport, Error, Looked, Packing, Quality, SceneKind, SensitivitySource, Target,
+    Compression, CompressionReport, Error, Looked, Packing, Quality, SensitivitySource, Target, Viewpoints,
 };
 use lexisplat_render::{Renderer, orbit};
 use lexisplat_sample::{SampleOptions, scene};
@@ -42,7 +42,7 @@ fn files_and_memory_are_the_same_as_source_and_sink() {
     let ways: [Compression; 3] = [
         CompressOptions::default().into(),
         Packing::default().into(),
-        Compression::Heuristic(Preset::Small, PackOptions::default()),
+        Compression::Guessed(Preset::Small, PackOptions::default()),
     ];
     for compression in ways {
         let (file, of_memory) = run(compression.clone(), &splats);
@@ -86,30 +86,30 @@ fn reports_have_the_same_keys_for_every_layout() {
     let (packed_keys, packed) = keys(Packing::new(Target::Size(20_000)).into());
     assert_eq!(exact_keys, packed_keys);
     assert!(exact["attribute_bytes"]["dictionary"].is_u64() && exact["pursuit"] == "ols");
-    assert!(exact["importance"].is_null() && exact["promise"].is_null());
+    assert!(exact["sensitivity"].is_null() && exact["target"].is_null());
     assert!(packed["pursuit"].is_null() && packed["learn_rounds"].is_null());
-    assert_eq!((&packed["importance"], &packed["device"]), (&"views".into(), &"cpu".into()));
-    assert_eq!(packed["promise"]["target"], "size");
+    assert_eq!((&packed["sensitivity"], &packed["device"]), (&"views".into(), &"cpu".into()));
+    assert_eq!(packed["target"]["kind"], "size");
 }
 
 #[test]
 fn memory_decides_between_whole_and_part_by_part() {
     let splats = sample();
     let (whole, report) = run(Packing::new(Preset::Small), &splats);
-    assert!(!report.in_parts && report.importance == Some(SensitivitySource::Views));
+    assert!(!report.in_parts && report.sensitivity == Some(SensitivitySource::Views));
     let (parts, report) = run(Packing::new(Preset::Small).with_memory(1000), &splats);
-    assert!(report.in_parts && report.importance == Some(SensitivitySource::Views));
+    assert!(report.in_parts && report.sensitivity == Some(SensitivitySource::Views));
     assert!(whole != parts);
     let (_, report) = run(Packing::new(Target::MeanPsnr(33.0)).with_memory(1000), &splats);
-    assert!(report.in_parts && report.importance == Some(SensitivitySource::Views));
-    let (_, report) = run(Compression::Heuristic(Preset::Small, PackOptions::default()), &splats);
-    assert!(report.in_parts && report.importance == Some(SensitivitySource::Heuristic));
+    assert!(report.in_parts && report.sensitivity == Some(SensitivitySource::Views));
+    let (_, report) = run(Compression::Guessed(Preset::Small, PackOptions::default()), &splats);
+    assert!(report.in_parts && report.sensitivity == Some(SensitivitySource::Guess));
     let cameras = orbit(&splats.geometry, 24, 64, 48);
     for (packing, name) in [
         (Packing::new(Target::MinPsnr(40.0)), "min-psnr"),
         (Packing::new(Target::Ratio(9.0)), "ratio"),
         (Packing::default().with_cameras(cameras), "cameras"),
-        (Packing::default().with_scene_kind(SceneKind::Room), "scene"),
+        (Packing::default().with_viewpoints(Viewpoints::Room), "views"),
     ] {
         match refused(packing.with_memory(1000)) {
             Error::Memory { choice, needed, allowed } => {
@@ -143,7 +143,8 @@ fn targets_out_of_reach_are_told_in_their_own_unit() {
 #[test]
 fn one_look_serves_several_files() {
     let splats = sample();
-    let looked = Arc::new(Looked::at(&mut Renderer::cpu(), &splats, None, SceneKind::Auto, &Silent).unwrap());
+    let looked =
+        Arc::new(Looked::at(&mut Renderer::cpu(), &splats, None, Viewpoints::Auto, &Silent).unwrap());
     for preset in [Preset::Small, Preset::High] {
         let known = Packing::new(preset).with_looked(Arc::clone(&looked));
         assert!(run(known, &splats).0 == run(Packing::new(Quality::Preset(preset)), &splats).0);

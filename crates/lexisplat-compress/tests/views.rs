@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3};
 use lexisplat::lexi::LexiReader;
 use lexisplat::packed::Preset;
 use lexisplat::{Limits, ShDegree, Silent, Splats, lexi};
-use lexisplat_compress::{Compression, CompressionReport, Judge, Packing, PackingViews, SceneKind, Target};
+use lexisplat_compress::{Compression, CompressionReport, Judge, Packing, PackingViews, Target, Viewpoints};
 use lexisplat_render::{Camera, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -22,8 +22,9 @@ fn run(packing: Packing, splats: &Splats) -> (Vec<u8>, CompressionReport) {
 #[test]
 fn the_kind_of_scene_says_where_views_are() {
     let splats = sample();
-    let views = |kind| PackingViews::of_kind(kind, &mut Renderer::cpu(), &splats, &Silent).unwrap();
-    let [object, room] = [SceneKind::Object, SceneKind::Room].map(views);
+    let views =
+        |viewpoints| PackingViews::generated(viewpoints, &mut Renderer::cpu(), &splats, &Silent).unwrap();
+    let [object, room] = [Viewpoints::Object, Viewpoints::Room].map(views);
     let names = |views: &[Camera]| views.iter().map(|view| view.name.clone()).collect::<Vec<_>>();
     let from = |views: &[Camera], name: &str| names(views).iter().filter(|n| n.starts_with(name)).count();
     assert_eq!(from(object.judging(), "orbit"), object.judging().len());
@@ -31,8 +32,8 @@ fn the_kind_of_scene_says_where_views_are() {
     assert_eq!(2 * from(room.measuring(), "room"), room.measuring().len());
     assert_eq!(2 * from(room.measuring(), "surround"), room.measuring().len());
     let found = PackingViews::found(&mut Renderer::cpu(), &splats, &Silent).unwrap();
-    assert_eq!(views(SceneKind::Auto).judging(), found.judging());
-    let (file, report) = run(Packing::new(Preset::Small).with_scene_kind(SceneKind::Room), &splats);
+    assert_eq!(views(Viewpoints::Auto).judging(), found.judging());
+    let (file, report) = run(Packing::new(Preset::Small).with_viewpoints(Viewpoints::Room), &splats);
     let reached = report.reached.unwrap();
     assert!(!reached.cameras && reached.judged_psnr > 30.0, "{reached:?}");
     let reader = LexiReader::open("scene.lexi", &file, &Limits::default()).unwrap();

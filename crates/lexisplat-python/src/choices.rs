@@ -9,7 +9,7 @@ use lexisplat::{
     lexi,
 };
 use lexisplat_compress::{
-    Compression, CompressionReport, Error, Packing, Quality, SceneKind, Target, choose_layout, read_beside,
+    Compression, CompressionReport, Error, Packing, Quality, Target, Viewpoints, choose_layout, read_beside,
 };
 use lexisplat_render::{Device, ViewSet};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -131,14 +131,14 @@ impl Choices {
         let options = pack_options(self.tol, self.atoms, self.keep_order, self.keep_all, self.seed);
         let preset = preset(self.preset.as_deref())?;
         if self.guess {
-            return Ok(Compression::Heuristic(preset, options));
+            return Ok(Compression::Guessed(preset, options));
         }
         let target = Target::chosen(self.psnr, self.min_psnr, self.size, self.ratio);
         let quality = target.map_or(Quality::Preset(preset), Quality::Target);
         let mut packing = Packing::new(quality)
             .with_options(options)
             .with_gpu(device.open_gpu()?)
-            .with_scene_kind(self.views.as_deref().map_or(Ok(SceneKind::Auto), views)?)
+            .with_viewpoints(self.views.as_deref().map_or(Ok(Viewpoints::Auto), views)?)
             .with_max_gaussians(self.max_gaussians);
         if let Some(bytes) = self.memory {
             packing = packing.with_memory(bytes);
@@ -164,7 +164,7 @@ impl Choices {
 }
 
 /// Where generated views are taken from, by name.
-fn views(name: &str) -> Result<SceneKind> {
+fn views(name: &str) -> Result<Viewpoints> {
     name.parse().map_err(|error| match error {
         Error::Parameter { value, expected, .. } => Error::parameter("views", value, expected),
         error => error,

@@ -174,7 +174,7 @@ impl Scene {
                 "nonzero_histogram": survey.nonzero_histogram,
                 "escapes": survey.escapes,
                 "record": RecordReport::from(reader.record()),
-                "promise": head.and_then(|head| head.target.as_ref()),
+                "target": head.and_then(|head| head.target.as_ref()),
                 "reached": head.and_then(|head| head.reached),
                 "removed": head.map_or(0, |head| head.removed),
                 "device": head.map(|head| head.device.as_deref().unwrap_or("cpu")),

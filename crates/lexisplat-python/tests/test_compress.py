@@ -29,8 +29,8 @@ from conftest import make, of_inria
         (["--guess"], {"guess": True}),
         (["--tol", "0.05"], {"tol": 0.05}),
         (["--layout", "paper", "--pursuit", "omp"], {"layout": "paper", "pursuit": "omp"}),
-        (["--max-nnz", "3"], {"max_nonzeros": 3}),
-        (["--scene", "object"], {"views": "object"}),
+        (["--max-nonzeros", "3"], {"max_nonzeros": 3}),
+        (["--views", "object"], {"views": "object"}),
     ],
 )
 def test_the_bytes_are_those_of_the_program(

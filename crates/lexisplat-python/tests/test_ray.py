@@ -62,7 +62,7 @@ def test_workers_make_the_bytes_of_the_program(tiles: list[Path], expected: byte
     report = lexisplat.ray.compress(tiles, out, progress=lambda *report: told.append(report), **FAST)
     assert out.read_bytes() == expected
     assert report["gaussians"] == 4 * TILE and report["file_bytes"] == len(expected) and report["skipped"] == []
-    assert report["output"] == str(out) and report["importance"] == "guess"
+    assert report["output"] == str(out) and report["sensitivity"] == "guess"
     assert {"survey", "look", "learn", "code", "write"} <= {stage for stage, _, _ in told}
     assert all(0 <= done <= total for _, done, total in told)
     # Two bytes a Gaussian, and sums.

@@ -82,7 +82,7 @@ fn packed_scenes_look_the_same() {
     let Some(gpu) = gpu() else { return };
     let splats = scene(&SampleOptions::new(3000, 2));
     let cameras = orbit(&splats.geometry, 2, 120, 80);
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
     let (packed, _) = packer.pack(1e-5, &Silent).unwrap();
     let model = packed.unpack().unwrap();

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lexisplat::packed::PackOptions;
 use lexisplat::{CompressOptions, Limits, Model, Progress, Splats, Stopwatch, lexi};
-use lexisplat_compress::{Compression, CompressionReport, Looked, Packing, Result, SceneKind};
+use lexisplat_compress::{Compression, CompressionReport, Looked, Packing, Result, Viewpoints};
 use lexisplat_render::Renderer;
 
 use super::options::SweepOptions;
@@ -35,7 +35,7 @@ pub(super) fn compress_scene(
             let looked = match looked {
                 Some(looked) => looked,
                 None => {
-                    looked.insert(Arc::new(Looked::at(renderer, splats, None, SceneKind::Auto, progress)?))
+                    looked.insert(Arc::new(Looked::at(renderer, splats, None, Viewpoints::Auto, progress)?))
                 }
             };
             let packing = PackOptions::default().with_seed(options.seed);

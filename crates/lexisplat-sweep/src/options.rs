@@ -77,7 +77,7 @@ impl SweepOptions {
                 Setting::Tolerance(t) if !(t.is_finite() && t >= 0.0) => {
                     return Err(Error::parameter("tol", t, "a finite number, 0 or above"));
                 }
-                Setting::MaxNonzeros(0) => return Err(Error::parameter("max-nnz", 0, "1 to 255")),
+                Setting::MaxNonzeros(0) => return Err(Error::parameter("max-nonzeros", 0, "1 to 255")),
                 _ => {}
             }
         }

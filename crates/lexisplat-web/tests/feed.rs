@@ -14,7 +14,7 @@ const ALL: u32 = u32::MAX;
 /// A file of several layers.
 fn file() -> Vec<u8> {
     let splats = scene(&SampleOptions::new(20_000, 3));
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
     let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
     let mut file = Vec::new();

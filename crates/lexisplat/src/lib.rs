@@ -32,7 +32,7 @@
 //!
 //! let splats = scene(&SampleOptions::new(2000, 0));
 //! // `lexisplat_render::sensitivity` measures it; without a renderer it can be guessed.
-//! let sensitivity = Sensitivity::heuristic(&splats.geometry);
+//! let sensitivity = Sensitivity::guess(&splats.geometry);
 //! let packer = Packer::new(&splats, &sensitivity, &PackOptions::default())?;
 //! let (packed, _) = packer.pack(packer.step_for(40.0), &Silent)?; // about 40 dB
 //!

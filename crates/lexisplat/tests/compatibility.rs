@@ -268,9 +268,9 @@ fn unknown_metadata_is_ignored() {
     let reached =
         r#"{"judged_psnr":38.5,"mean_psnr":40,"min_psnr":31,"views":12,"cameras":false,"judge":"someone"}"#;
     assert_same("packed3", &parts.with("reached", reached), &parts);
-    let mut promise: Value = serde_json::from_str(parts.metadata["promise"].as_str().unwrap()).unwrap();
-    promise["judge"] = Value::from("someone");
-    assert_same("packed3", &parts.with("promise", &promise.to_string()), &parts);
+    let mut target: Value = serde_json::from_str(parts.metadata["target"].as_str().unwrap()).unwrap();
+    target["judge"] = Value::from("someone");
+    assert_same("packed3", &parts.with("target", &target.to_string()), &parts);
 }
 
 #[test]
@@ -344,7 +344,7 @@ fn members_that_are_there_twice_are_refused() {
         }
     }
     let parts = parts_of("packed3");
-    for key in ["promise", "reached"] {
+    for key in ["target", "reached"] {
         for said in scene_refusals(&parts.with(key, r#"{"views":1,"views":2}"#).sealed()) {
             assert!(said.contains(&format!("metadata '{key}': member 'views' is there twice")), "{said}");
         }

@@ -296,7 +296,7 @@ fn cancelled_work_ends() {
     let splats = scene(3000, 1, 18);
     let error = compress(splats.clone(), &CompressOptions::default(), &Cancelled).unwrap_err();
     assert!(matches!(error, Error::Cancelled), "{error}");
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     let packer = Packer::new(splats.clone(), &sensitivity, &PackOptions::default()).unwrap();
     let error = packer.pack(1e-4, &Cancelled).unwrap_err();
     assert!(matches!(error, Error::Cancelled), "{error}");
@@ -324,7 +324,7 @@ fn sources_of_every_kind_give_the_same_bytes() {
     let bytes = compressed(&splats);
     assert!(bytes == compressed(&ply));
     // What a .lexi file gives is what it decodes to, whether exact or packed.
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
     let mut packed = Vec::new();
     LexiWriter::packed(&packer.pack(1e-4, &Silent).unwrap().0).write(&mut packed, &Silent).unwrap();

@@ -39,7 +39,7 @@ fn ply_bytes(splats: &Splats) -> Vec<u8> {
     bytes
 }
 
-fn promise() -> TargetRecord {
+fn target() -> TargetRecord {
     TargetRecord::new("psnr", 38.5, [38.562, 33.25], 18, false)
 }
 
@@ -50,7 +50,7 @@ fn regenerate() {
     let pack = |splats: &Splats, change: fn(&mut PackOptions)| {
         let mut options = PackOptions::default();
         change(&mut options);
-        let sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
         Packer::new(splats, &sensitivity, &options).unwrap().pack(2e-5, &Silent).unwrap()
     };
     let write = |name: &str, packed: &Packed| {
@@ -72,7 +72,7 @@ fn regenerate() {
         Extra { name: "one".to_owned(), values: ExtraValues::F64(vec![1.0; 300]) },
     ];
     let (packed, _) = pack(&splats, |o| o.keep_order = true);
-    write("packed3", &packed.with_target(promise()));
+    write("packed3", &packed.with_target(target()));
 
     let splats = scene(&SampleOptions::new(40, 2)).with_degree_cut(ShDegree::ZERO);
     write("packed3_degree0", &pack(&splats, |o| o.seed = 7).0);
@@ -123,7 +123,7 @@ fn golden_files_are_the_same_on_any_number_of_threads() {
 fn golden_files_say_how_they_were_made() {
     let (packed, model) = (opened("packed3"), decoded("packed3"));
     assert_eq!((packed.len(), packed.head().degree, model.len()), (300, ShDegree::THREE, 300));
-    assert_eq!(packed.head().target.as_ref(), Some(&promise()));
+    assert_eq!(packed.head().target.as_ref(), Some(&target()));
     assert_eq!(packed.head().meta.comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
     assert!(
         packed.head().meta.antialiased

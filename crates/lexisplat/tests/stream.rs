@@ -107,7 +107,7 @@ fn escapes_and_pointers_are_found_in_every_part() {
 #[test]
 fn a_packed_file_in_either_order_comes_out_as_if_read_whole() {
     let whole = splats(40_000).with_degree_cut(lexisplat::ShDegree::new(2).unwrap());
-    let sensitivity = Sensitivity::heuristic(&whole.geometry);
+    let sensitivity = Sensitivity::guess(&whole.geometry);
     let folder = tempfile::tempdir().unwrap();
     for keep_order in [false, true] {
         let mut options = PackOptions::default();

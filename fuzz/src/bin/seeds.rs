@@ -199,7 +199,7 @@ fn packed(root: &Path) -> Done {
                     splats.sh_rest[..degree.rest()].fill(1e6);
                 }
             }
-            let sensitivity = Sensitivity::heuristic(&splats.geometry);
+            let sensitivity = Sensitivity::guess(&splats.geometry);
             let packer = Packer::new(&splats, &sensitivity, &options)?;
             let (packed, _) = packer.pack(1e-3, &Silent)?;
             let target = rich.then(|| TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false));
@@ -237,7 +237,7 @@ fn several_layers(root: &Path) -> Done {
                 options.atoms = Some(ATOMS);
                 splats.sh_rest[..degree.rest()].fill(1e6);
             }
-            let sensitivity = Sensitivity::heuristic(&splats.geometry);
+            let sensitivity = Sensitivity::guess(&splats.geometry);
             let (packed, _) = Packer::new(&splats, &sensitivity, &options)?.pack(1e-4, &Silent)?;
             let mut bytes = Vec::new();
             LexiWriter::packed(&packed).write(&mut bytes, &Silent)?;

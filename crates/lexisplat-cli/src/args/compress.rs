@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
-use lexisplat_compress::{SceneKind, choose_layout};
+use lexisplat_compress::{Viewpoints, choose_layout};
 use lexisplat_render::Device;
 
 use super::part::Part;
-use super::values::{length, preset, real, scene_kind, size, whole};
+use super::values::{length, preset, real, size, viewpoints, whole};
 
 /// Heading of the options that say how good or how small the file shall be.
 const TARGET: &str = "Target, at most one of";
@@ -60,8 +60,8 @@ pub(crate) struct Compress {
     pub(crate) near: Option<f32>,
     /// Draw and judge the scene from around an `object` or from inside a `room`. `auto` looks for views like
     /// photographs [default: auto].
-    #[arg(long, value_parser = scene_kind(), conflicts_with = "cameras")]
-    pub(crate) scene: Option<SceneKind>,
+    #[arg(long, value_parser = viewpoints(), conflicts_with = "cameras")]
+    pub(crate) views: Option<Viewpoints>,
     /// Store the index that each Gaussian has in the source, 1 to 3 bytes each. Without it packed files lose the
     /// order of the source.
     #[arg(long)]
@@ -82,7 +82,7 @@ pub(crate) struct Compress {
     /// Most nonzeros in the code of one Gaussian. With it --tol is no longer guaranteed: the report counts the
     /// Gaussians whose error is larger [default: no cap].
     #[arg(long, value_name = "K", value_parser = whole::<u8>(0..=255), help_heading = EXACT)]
-    pub(crate) max_nnz: Option<u8>,
+    pub(crate) max_nonzeros: Option<u8>,
     /// Atoms of the dictionary, 1 to 1024 [default: as many as make the file smaller if packed, otherwise twice the
     /// dimension: 90 at SH degree 3].
     #[arg(long, value_name = "M", value_parser = whole::<usize>(0..=u64::MAX))]
@@ -117,7 +117,7 @@ pub(crate) struct Compress {
     pub(crate) drop_extras: bool,
     /// Estimate how much each Gaussian shows from its own values instead of drawing the scene. This is several times
     /// faster and makes larger files of the same quality. The only target is then --preset.
-    #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "scene"])]
+    #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "views"])]
     pub(crate) guess: bool,
     /// Approximate memory that packing a whole scene may take, such as 500MB. A scene that needs more is packed in
     /// parts, each drawn on its own, and so is one of more than 1,572,864 Gaussians without cameras. The only targets are
@@ -139,7 +139,7 @@ impl Compress {
     /// The options that only layouts with exact geometry have, and whether they are given.
     fn exact_only(&self) -> [(&'static str, bool); 5] {
         [
-            ("--max-nnz", self.max_nnz.is_some()),
+            ("--max-nonzeros", self.max_nonzeros.is_some()),
             ("--pursuit", self.pursuit.is_some()),
             ("--dictionary", self.dictionary.is_some()),
             ("--save-dictionary", self.save_dictionary.is_some()),
@@ -157,7 +157,7 @@ impl Compress {
             ("--size", self.size.is_some()),
             ("--ratio", self.ratio.is_some()),
             ("--cameras", self.cameras.is_some()),
-            ("--scene", self.scene.is_some()),
+            ("--views", self.views.is_some()),
             ("--keep-order", self.keep_order),
             ("--keep-all", self.keep_all),
             ("--max-gaussians", self.max_gaussians.is_some()),
@@ -166,7 +166,7 @@ impl Compress {
 
     /// Whether cameras that lie beside the scene are used.
     pub(crate) fn looks_beside(&self) -> bool {
-        let other = self.cameras.is_some() || self.no_cameras || self.scene.is_some();
+        let other = self.cameras.is_some() || self.no_cameras || self.views.is_some();
         !other && self.inputs.len() == 1
     }
 

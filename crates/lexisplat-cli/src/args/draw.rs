@@ -23,7 +23,7 @@ pub(crate) struct Render {
     pub(crate) views: Views,
 }
 
-/// Draw two scenes from the same cameras and score the second against the first. Without --cameras and --scene views
+/// Draw two scenes from the same cameras and score the second against the first. Without --cameras and --views views
 /// like photographs are looked for, as sharp as the scene, as `compress` does.
 #[derive(Debug, Args)]
 pub(crate) struct Compare {

@@ -73,20 +73,20 @@ pub(crate) struct Sweep {
     #[arg(long, value_name = "3dgs|mcmc|pixelgs|eagles|eagles-no-sq|other", default_value = "other")]
     pub(crate) method: Method,
     /// Tolerances to compress with, each above 0, with commas between them [default: the paper's, 0.03,0.05,0.1,0.2; none
-    /// if --max-nnz or --presets is given].
+    /// if --max-nonzeros or --presets is given].
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = real::<f64>("0.1"))]
     pub(crate) tol: Vec<f64>,
     /// Caps on the nonzeros of a Gaussian to compress with, without a tolerance, with commas between them.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = whole::<u8>(0..=255))]
-    pub(crate) max_nnz: Vec<u8>,
+    pub(crate) max_nonzeros: Vec<u8>,
     /// Presets of packed files to compress with, with commas between them.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = preset())]
     pub(crate) presets: Vec<Preset>,
-    /// The pursuit that chooses atoms, with --tol and --max-nnz: `omp` is the paper's, whose numbers stand beside it; `ols`,
+    /// The pursuit that chooses atoms, with --tol and --max-nonzeros: `omp` is the paper's, whose numbers stand beside it; `ols`,
     /// which `compress` uses, needs fewer of them.
     #[arg(long, value_name = "omp|ols", default_value = "omp")]
     pub(crate) pursuit: Pursuit,
-    /// Layout of the files, with --tol and --max-nnz.
+    /// Layout of the files, with --tol and --max-nonzeros.
     #[arg(long, value_name = "f32|f16|paper", default_value = "f16")]
     pub(crate) layout: Layout,
     /// Seed of the choice of Gaussians that dictionaries are learned from.

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lexisplat::packed::Preset;
-use lexisplat_compress::{SceneKind, SplitFilter};
+use lexisplat_compress::{SplitFilter, Viewpoints};
 use lexisplat_render::gpu::ShPath;
 
 /// What a size looks like, for messages.
@@ -24,8 +24,8 @@ pub(super) fn sh_path() -> impl TypedValueParser<Value = ShPath> {
 }
 
 /// Returns the parser of the place of generated views.
-pub(super) fn scene_kind() -> impl TypedValueParser<Value = SceneKind> {
-    PossibleValuesParser::new(["auto", "object", "room"]).try_map(|name| name.parse::<SceneKind>())
+pub(super) fn viewpoints() -> impl TypedValueParser<Value = Viewpoints> {
+    PossibleValuesParser::new(["auto", "object", "room"]).try_map(|name| name.parse::<Viewpoints>())
 }
 
 /// Returns the parser of a split of cameras.

@@ -3,17 +3,17 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lexisplat_compress::{SceneKind, SplitFilter, ViewOptions};
+use lexisplat_compress::{SplitFilter, ViewOptions, Viewpoints};
 use lexisplat_render::Device;
 
-use super::values::{colour, length, scene_kind, split, whole};
+use super::values::{colour, length, split, viewpoints, whole};
 
 /// Which cameras to draw from, and on what.
 #[derive(Debug, Args)]
 pub(crate) struct Views {
     /// Cameras to draw from: INRIA's cameras.json, a transforms.json of nerfstudio, or a COLMAP folder such as
     /// sparse/0 [default: views generated for the scene].
-    #[arg(long, visible_alias = "sparse", value_name = "PATH", conflicts_with_all = ["orbit", "scene"])]
+    #[arg(long, visible_alias = "sparse", value_name = "PATH", conflicts_with_all = ["orbit", "viewpoints"])]
     pub(crate) cameras: Option<PathBuf>,
     /// The cameras to use: all of them, or those of one split. If the file marks no split, --hold makes one
     /// [default: all; with photos, test].
@@ -24,8 +24,8 @@ pub(crate) struct Views {
     #[arg(long, default_value_t = lexisplat_compress::DEFAULT_HOLD, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX), requires = "cameras")]
     pub(crate) hold: usize,
     /// The place of generated views: around an `object`, or inside a `room`. `auto` decides by the scene.
-    #[arg(long, value_parser = scene_kind(), default_value = "auto")]
-    pub(crate) scene: SceneKind,
+    #[arg(long = "views", value_parser = viewpoints(), default_value = "auto")]
+    pub(crate) viewpoints: Viewpoints,
     /// Number of generated views, 1 to 65535.
     #[arg(long, default_value_t = lexisplat_compress::DEFAULT_ORBIT, value_name = "N", value_parser = whole::<u16>(1..=65_535))]
     pub(crate) orbit: u16,
@@ -64,7 +64,7 @@ impl Views {
         let mut options = ViewOptions::default();
         options.cameras.clone_from(&self.cameras);
         options.hold = self.hold;
-        options.kind = self.scene;
+        options.viewpoints = self.viewpoints;
         options.count = self.orbit;
         options.max_width = self.width;
         options.near = self.near;

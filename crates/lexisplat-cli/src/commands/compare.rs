@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::{Model, Progress};
-use lexisplat_compress::{DrawOptions, SceneKind, judging_views};
+use lexisplat_compress::{DrawOptions, Viewpoints, judging_views};
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, Loaded, SceneFile, Whereabouts, compare, format, montage, png};
 use lexisplat_render::{Camera, Renderer};
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let views = &args.views;
     let mut renderer = open_renderer(views.device)?;
     let bars = Bars::new(common.quiet);
-    let found = views.cameras.is_none() && views.scene == SceneKind::Auto;
+    let found = views.cameras.is_none() && views.viewpoints == Viewpoints::Auto;
     let cameras = match found {
         true => photographs(&a, views, &mut renderer, &bars)?,
         false => super::cameras(views, &scene_a)?,

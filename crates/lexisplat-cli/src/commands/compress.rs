@@ -184,13 +184,13 @@ fn compression(args: &Compress, given: Option<&ViewSet>, limits: &Limits) -> Res
         .with_seed(args.seed);
     let preset = args.preset.unwrap_or_default();
     if args.guess {
-        return Ok(Compression::Heuristic(preset, options));
+        return Ok(Compression::Guessed(preset, options));
     }
     let target = Target::chosen(args.psnr, args.min_psnr, args.size, args.ratio);
     let mut packing = Packing::new(target.map_or(Quality::Preset(preset), Quality::Target))
         .with_options(options)
         .with_gpu(open_gpu(args.device)?)
-        .with_scene_kind(args.scene.unwrap_or_default())
+        .with_viewpoints(args.views.unwrap_or_default())
         .with_max_gaussians(args.max_gaussians)
         .with_memory(args.memory);
     if let Some(set) = given {
@@ -201,8 +201,8 @@ fn compression(args: &Compress, given: Option<&ViewSet>, limits: &Limits) -> Res
 
 fn exact(args: &Compress, layout: Layout, limits: &Limits) -> Result<CompressOptions> {
     let mut options = CompressOptions::default();
-    options.tolerance = args.tol.or_else(|| args.max_nnz.is_none().then_some(DEFAULT_TOLERANCE));
-    options.max_nonzeros = args.max_nnz;
+    options.tolerance = args.tol.or_else(|| args.max_nonzeros.is_none().then_some(DEFAULT_TOLERANCE));
+    options.max_nonzeros = args.max_nonzeros;
     options.atoms = args.atoms;
     options.pursuit = args.pursuit.unwrap_or(options.pursuit);
     options.values = layout.values();
@@ -229,7 +229,7 @@ fn text(report: &CompressionReport, output: &Path, all: bool) -> Result<String> 
     let quality = match report.reached.as_ref().filter(|_| report.record.tolerance.is_none()) {
         Some(reached) => format!("pictures: {}", reached_line(reached)),
         None if report.record.tolerance.is_some() => format!("SH error: {}", error_line(&report.record)),
-        None if report.importance == Some(SensitivitySource::Heuristic) => {
+        None if report.sensitivity == Some(SensitivitySource::Guess) => {
             "pictures: not looked at; what shows was guessed from each Gaussian alone".to_owned()
         }
         None if report.in_parts => {
@@ -303,7 +303,7 @@ fn details(report: &CompressionReport) -> Result<String> {
             line("escapes", format!("{} Gaussians' SH stored exactly", format::count(report.escapes)))?;
         }
     }
-    if report.importance == Some(SensitivitySource::Heuristic) {
+    if report.sensitivity == Some(SensitivitySource::Guess) {
         line("scene", "what shows was guessed from each Gaussian alone".to_owned())?;
     } else if report.in_parts {
         line("scene", "large, so it was measured and packed part by part".to_owned())?;
@@ -382,13 +382,13 @@ pub(crate) fn removed_line(removed: u64) -> String {
     format!("{} Gaussians, which show least", format::count(removed))
 }
 
-/// What a file records of its pictures. Files made before `reached` was recorded have a `promise` at most.
-pub(crate) fn record_line(reached: Option<&ReachedRecord>, promise: Option<&TargetRecord>) -> Option<String> {
-    let of_promise = |target: &TargetRecord| {
+/// The decibels that a file records, if it records any. A file may have `reached`, `target`, both or neither.
+pub(crate) fn record_line(reached: Option<&ReachedRecord>, target: Option<&TargetRecord>) -> Option<String> {
+    let of_target = |target: &TargetRecord| {
         let TargetRecord { mean_psnr, min_psnr, views, cameras, .. } = target;
         psnr_line(*mean_psnr, *min_psnr, views, *cameras)
     };
-    reached.map(reached_line).or_else(|| promise.map(of_promise))
+    reached.map(reached_line).or_else(|| target.map(of_target))
 }
 
 /// The mean and the least PSNR over `views` views, which were `given` or else generated.

@@ -96,10 +96,10 @@ fn entries(args: &Sweep) -> Result<Vec<Entry>> {
 fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     let mut options = SweepOptions::default();
     options.limits = common.limits()?;
-    let is_default = args.max_nnz.is_empty() && args.presets.is_empty() && args.tol.is_empty();
+    let is_default = args.max_nonzeros.is_empty() && args.presets.is_empty() && args.tol.is_empty();
     if !is_default {
         let tolerances = args.tol.iter().copied().map(Setting::Tolerance);
-        let caps = args.max_nnz.iter().copied().map(Setting::MaxNonzeros);
+        let caps = args.max_nonzeros.iter().copied().map(Setting::MaxNonzeros);
         let presets = args.presets.iter().copied().map(Setting::Preset);
         options.settings = tolerances.chain(caps).chain(presets).collect();
     }

@@ -166,7 +166,7 @@ fn temporary_files_that_have_a_name_are_removed() {
         "8",
         "--sample",
         "2000",
-        "--max-nnz",
+        "--max-nonzeros",
         "1",
     ]);
     let before = folder.names();

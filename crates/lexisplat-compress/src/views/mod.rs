@@ -32,7 +32,7 @@ const DIVISORS: [u32; 4] = [1, 2, 4, 8];
 
 /// Where generated views are taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SceneKind {
+pub enum Viewpoints {
     /// From where [`is_interior`] says.
     #[default]
     Auto,
@@ -42,7 +42,7 @@ pub enum SceneKind {
     Room,
 }
 
-impl FromStr for SceneKind {
+impl FromStr for Viewpoints {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
@@ -50,7 +50,7 @@ impl FromStr for SceneKind {
             "auto" => Ok(Self::Auto),
             "object" => Ok(Self::Object),
             "room" => Ok(Self::Room),
-            _ => Err(Error::parameter("scene", text, "auto, object or room")),
+            _ => Err(Error::parameter("views", text, "auto, object or room")),
         }
     }
 }
@@ -66,7 +66,7 @@ pub struct ViewOptions {
     /// 0.
     pub hold: usize,
     /// Where generated views are taken from.
-    pub kind: SceneKind,
+    pub viewpoints: Viewpoints,
     /// Number of views to generate.
     pub count: u16,
     /// Largest width of a picture, in pixels. Wider cameras are scaled down.
@@ -89,7 +89,7 @@ impl Default for ViewOptions {
             cameras: None,
             split: SplitFilter::All,
             hold: DEFAULT_HOLD,
-            kind: SceneKind::Auto,
+            viewpoints: Viewpoints::Auto,
             count: DEFAULT_ORBIT,
             max_width: DEFAULT_MAX_WIDTH,
             images: None,
@@ -183,10 +183,10 @@ fn generated(options: &ViewOptions, divisor: u32, geometry: &Geometry) -> Result
     if options.images.is_some() {
         return Err(Error::parameter("images", "a folder", "a folder only with the cameras of the photos"));
     }
-    let inside = match options.kind {
-        SceneKind::Auto => is_interior(geometry),
-        SceneKind::Object => false,
-        SceneKind::Room => true,
+    let inside = match options.viewpoints {
+        Viewpoints::Auto => is_interior(geometry),
+        Viewpoints::Object => false,
+        Viewpoints::Room => true,
     };
     let (count, (width, height)) = (usize::from(options.count), ORBIT_SIZE);
     let (cameras, from) = if inside {

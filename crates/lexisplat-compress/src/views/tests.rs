@@ -300,7 +300,7 @@ fn splits_come_before_photos_and_sizes_from_photos() {
 }
 
 #[test]
-fn generated_views_are_of_the_kind_asked_for() {
+fn generated_views_are_from_where_they_were_asked_for() {
     let mut geometry = Geometry::default();
     for i in 0..500_u16 {
         let at = |step: f32| (f32::from(i) * step).fract() * 2.0 - 1.0;
@@ -309,11 +309,11 @@ fn generated_views_are_of_the_kind_asked_for() {
         geometry.scales.push([-3.0; 3]);
         geometry.rotations.push([1.0, 0.0, 0.0, 0.0]);
     }
-    let make = |kind| {
-        let options = ViewOptions { kind, count: 5, max_width: 480, ..ViewOptions::default() };
+    let make = |viewpoints| {
+        let options = ViewOptions { viewpoints, count: 5, max_width: 480, ..ViewOptions::default() };
         find_views(&options, &geometry).unwrap()
     };
-    let (auto, object, room) = (make(SceneKind::Auto), make(SceneKind::Object), make(SceneKind::Room));
+    let (auto, object, room) = (make(Viewpoints::Auto), make(Viewpoints::Object), make(Viewpoints::Room));
     assert_eq!((auto.from.as_str(), room.from.as_str()), ("orbit", "room"));
     assert_eq!(auto, object);
     assert_eq!((room.views.len(), room.views[4].camera.name.as_str()), (5, "room_004"));

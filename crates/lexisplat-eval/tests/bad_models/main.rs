@@ -49,7 +49,7 @@ fn refused(value: f32, property: &str, array: &str, change: Change) {
 
     let error = compress(bad.clone(), &CompressOptions::default(), &Silent).unwrap_err();
     assert!(matches!(error, Error::Parameter { .. }), "{error}");
-    let sensitivity = Sensitivity::heuristic(&kept.geometry);
+    let sensitivity = Sensitivity::guess(&kept.geometry);
     assert_eq!(sensitivity.len(), 58);
     let packer = Packer::new(&bad, &Sensitivity::zeros(60), &PackOptions::default()).map(|_| ());
     // Normals are not packed.

@@ -84,7 +84,7 @@ pub(crate) fn everything(splats: &Splats) -> Outcome {
     assert!(found.attributes.iter().all(|a| a.min.is_finite() && a.max.is_finite() && a.mean.is_finite()));
 
     let [exact, escapes] = exact(splats);
-    let guessed = packed(splats, &Sensitivity::heuristic(&splats.geometry));
+    let guessed = packed(splats, &Sensitivity::guess(&splats.geometry));
     let seen = sensitivity(&Scene::from(splats), &cameras(), &Silent).unwrap();
     let packed = packed(splats, &seen);
     assert_eq!(guessed.is_some(), packed.is_some());

@@ -155,7 +155,7 @@ pub(crate) struct SpilledPacked {
 #[non_exhaustive]
 pub struct TargetRecord {
     /// `psnr`, `min-psnr` or `size`.
-    pub target: String,
+    pub kind: String,
     /// Decibels or bytes asked for.
     pub asked: f64,
     /// Mean PSNR over the views searched with, in decibels.
@@ -171,9 +171,9 @@ pub struct TargetRecord {
 impl TargetRecord {
     /// Puts a record together. `reached` is the mean and the least PSNR.
     #[must_use]
-    pub fn new(target: &str, asked: f64, reached: [f64; 2], views: u32, cameras: bool) -> Self {
+    pub fn new(kind: &str, asked: f64, reached: [f64; 2], views: u32, cameras: bool) -> Self {
         let [mean_psnr, min_psnr] = reached;
-        Self { target: target.to_owned(), asked, mean_psnr, min_psnr, views, cameras }
+        Self { kind: kind.to_owned(), asked, mean_psnr, min_psnr, views, cameras }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::support::maths;
 /// For each Gaussian the expected squared change of a picture's colour values, averaged over pixels and
 /// channels, for a squared error of 1 in one of its values (the diagonal of a Gauss-Newton matrix).
 ///
-/// A renderer measures it; [`Sensitivity::heuristic`] needs none.
+/// A renderer measures it; [`Sensitivity::guess`] needs none.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sensitivity {
     /// By one channel of the colour, for each channel alike.
@@ -140,25 +140,25 @@ impl Sensitivity {
     /// Gaussians hide others, so files made with it are larger than files of the same quality made with a
     /// measured sensitivity.
     #[must_use]
-    pub fn heuristic(geometry: &Geometry) -> Self {
-        Self::heuristic_part(geometry, heuristic_total(0.0, geometry))
+    pub fn guess(geometry: &Geometry) -> Self {
+        Self::guess_of_part(geometry, guessed_total(0.0, geometry))
     }
 
-    /// [`Self::heuristic`] of a part of a scene whose [`heuristic_total`] is `total`.
-    pub(crate) fn heuristic_part(geometry: &Geometry, total: f64) -> Self {
+    /// [`Self::guess`] of a part of a scene whose [`guessed_total`] is `total`.
+    pub(crate) fn guess_of_part(geometry: &Geometry, total: f64) -> Self {
         let n = geometry.len();
         let mut out = Self::zeros(n);
         out.removal.fill(f32::INFINITY);
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let unit = (1.0 / (3.0 * total.max(LEAST_TOTAL))) as f32;
         for i in 0..n {
-            out.set_heuristic(geometry, i, heuristic_weight(geometry, i) * unit);
+            out.set_guess(geometry, i, guessed_weight(geometry, i) * unit);
         }
         out
     }
 
     /// Estimates everything of Gaussian `i` except its removal from its sensitivity to colour.
-    fn set_heuristic(&mut self, geometry: &Geometry, i: usize, colour: f32) {
+    fn set_guess(&mut self, geometry: &Geometry, i: usize, colour: f32) {
         let shape = CONTRAST * colour;
         self.colour[i] = colour;
         self.opacity[i] = shape;
@@ -177,8 +177,8 @@ impl Sensitivity {
         self.position[i] = [along, 0.0, 0.0, along, 0.0, along];
     }
 
-    /// Mixes the measured sensitivity with the heuristic one, which does not depend on views. Each weight becomes
-    /// the geometric mean of both, in which the heuristic one has the exponent `share`. Gaussians that the views
+    /// Mixes the measured sensitivity with the guessed one, which does not depend on views. Each weight becomes
+    /// the geometric mean of both, in which the guessed one has the exponent `share`. Gaussians that the views
     /// hardly showed keep a weight, because other views may show them. `geometry` is that of the same Gaussians.
     ///
     /// # Panics
@@ -189,19 +189,19 @@ impl Sensitivity {
         let total: f64 = self.colour.iter().map(|&v| f64::from(v)).sum();
         if total <= 0.0 {
             let [removal, removal_view] = [&mut self.removal, &mut self.removal_view].map(std::mem::take);
-            *self = Self { removal, removal_view, ..Self::heuristic(geometry) };
+            *self = Self { removal, removal_view, ..Self::guess(geometry) };
             return;
         }
         let mut sorted = self.colour.clone();
         sorted.sort_by(f32::total_cmp);
         let floor = sorted[sorted.len() * 9 / 10] * UNSEEN;
         drop(sorted);
-        let guessed: f64 = (0..n).map(|i| f64::from(heuristic_weight(geometry, i))).sum();
+        let guessed: f64 = (0..n).map(|i| f64::from(guessed_weight(geometry, i))).sum();
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let unit = (total / guessed.max(LEAST_TOTAL)) as f32;
         let mixed: Vec<f32> = (0..n)
             .map(|i| {
-                let guessed = (heuristic_weight(geometry, i) * unit).max(f32::MIN_POSITIVE);
+                let guessed = (guessed_weight(geometry, i) * unit).max(f32::MIN_POSITIVE);
                 let seen = self.colour[i].max(floor).max(f32::MIN_POSITIVE);
                 let mixed = maths::exp((1.0 - share) * maths::ln(seen) + share * maths::ln(guessed));
                 mixed.max(LEAST_OF_GUESS * guessed)
@@ -213,7 +213,7 @@ impl Sensitivity {
             let wanted = mixed * back;
             let seen = self.colour[i];
             if seen <= floor {
-                self.set_heuristic(geometry, i, wanted);
+                self.set_guess(geometry, i, wanted);
                 continue;
             }
             let factor = wanted / seen;
@@ -226,12 +226,12 @@ impl Sensitivity {
 }
 
 /// Adds the expected weights of all Gaussians, before they are scaled, to `sum`, one after the other.
-pub(crate) fn heuristic_total(sum: f64, geometry: &Geometry) -> f64 {
-    (0..geometry.len()).fold(sum, |sum, i| sum + f64::from(heuristic_weight(geometry, i)))
+pub(crate) fn guessed_total(sum: f64, geometry: &Geometry) -> f64 {
+    (0..geometry.len()).fold(sum, |sum, i| sum + f64::from(guessed_weight(geometry, i)))
 }
 
 /// The expected weight of a Gaussian before it is scaled.
-fn heuristic_weight(geometry: &Geometry, i: usize) -> f32 {
+fn guessed_weight(geometry: &Geometry, i: usize) -> f32 {
     let scales = geometry.scales[i];
     let [longest, middle, _] = maths::longest_first(scales).map(|k| scales[k]);
     let alpha = maths::log_sigmoid(geometry.opacities[i]);
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn no_weight_is_far_below_the_guess() {
         let geometry = crate::support::testing::scene(400, 5).geometry;
-        let guessed = Sensitivity::heuristic(&geometry);
+        let guessed = Sensitivity::guess(&geometry);
         let mut measured = guessed.clone();
         // Views that saw the first half of the scene only, and some of it hardly.
         for (i, weight) in measured.colour.iter_mut().enumerate() {

@@ -5,7 +5,7 @@ use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
 use crate::packed::tiles::{Assembly, BUCKET, Coded, Coding, Looked, Plan, SHOWN, Sample, Steps, Tables};
 use crate::packed::{PackOptions, PackedHead, Packer, Refit};
-use crate::scene::sensitivity::{Sensitivity, heuristic_total};
+use crate::scene::sensitivity::{Sensitivity, guessed_total};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
@@ -91,8 +91,8 @@ fn whole<E: From<Error>>(
     let observed = match &mut observer {
         Some(observer) => observer.observe(&splats)?,
         None => {
-            let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
-            Sensitivity::heuristic_part(&splats.geometry, total).into()
+            let total = guessed_total(0.0, &splats.geometry) / SHOWN;
+            Sensitivity::guess_of_part(&splats.geometry, total).into()
         }
     };
     progress.end();

@@ -110,7 +110,7 @@ mod tests {
         let values = ExtraValues::U32((0..u32::try_from(n).unwrap()).collect());
         splats.geometry.extras = vec![Extra { name: "nx".into(), values }];
         let options = PackOptions { keep_order: true, atoms: Some(8), ..PackOptions::default() };
-        let sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let (packed, _) = packer.pack(packer.step_for(30.0), &Silent).unwrap();
         let mut bytes = Vec::new();

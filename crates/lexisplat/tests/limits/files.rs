@@ -62,7 +62,7 @@ pub(crate) fn exact(splats: &Splats, layout: Layout) -> Vec<u8> {
 pub(crate) fn packed(splats: &Splats, step: f64, keep_order: bool) -> Vec<u8> {
     let mut options = PackOptions::default();
     (options.keep_order, options.atoms) = (keep_order, Some(8));
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     let packer = Packer::new(splats, &sensitivity, &options).unwrap();
     let mut bytes = Vec::new();
     LexiWriter::packed(&packer.pack(step, &Silent).unwrap().0).write(&mut bytes, &Silent).unwrap();

@@ -31,7 +31,7 @@ fn copies_of_one_gaussian_come_back_alike() {
 #[test]
 fn the_cheapest_gaussians_there_are_can_be_read() {
     let splats = copies(&sample(1, 43, 0), 100_000);
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
     let (packed, _) = packer.quantise(1e300, false, &Silent).unwrap().finish(None, None, &Silent).unwrap();
     let bytes = bytes(&packed);

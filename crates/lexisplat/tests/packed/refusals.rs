@@ -17,7 +17,7 @@ fn refused(splats: &Splats, sensitivity: &Sensitivity, options: &PackOptions) ->
 fn steps_out_of_range_are_named() {
     let splats = sample(20, 51, 3);
     let packer =
-        Packer::new(&splats, &Sensitivity::heuristic(&splats.geometry), &PackOptions::default()).unwrap();
+        Packer::new(&splats, &Sensitivity::guess(&splats.geometry), &PackOptions::default()).unwrap();
     for (step, name) in
         [(0.0, "step = 0"), (-1e-5, "step = -"), (f64::NAN, "step = NaN"), (f64::INFINITY, "step = inf")]
     {
@@ -29,7 +29,7 @@ fn steps_out_of_range_are_named() {
 #[test]
 fn options_out_of_range_are_named() {
     let splats = sample(20, 52, 3);
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     let run = |change: fn(&mut PackOptions)| refused(&splats, &sensitivity, &options(change));
     assert!(run(|o| o.atoms = Some(0)).starts_with("atoms = 0: 1 to 1024"));
     assert!(run(|o| o.atoms = Some(1025)).starts_with("atoms = 1025"));
@@ -53,7 +53,7 @@ fn the_most_atoms_there_may_be_work() {
 fn weights_that_do_not_fit_the_scene_are_named() {
     let splats = sample(20, 54, 3);
     let run = |change: fn(&mut Sensitivity)| {
-        let mut sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let mut sensitivity = Sensitivity::guess(&splats.geometry);
         change(&mut sensitivity);
         let text = refused(&splats, &sensitivity, &PackOptions::default());
         assert!(text.starts_with("sensitivity = "), "{text}");
@@ -72,7 +72,7 @@ fn weights_that_do_not_fit_the_scene_are_named() {
 fn values_that_are_not_finite_are_named() {
     let run = |change: fn(&mut Splats)| {
         let mut splats = sample(20, 55, 3);
-        let sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
         change(&mut splats);
         refused(&splats, &sensitivity, &PackOptions::default())
     };
@@ -92,7 +92,7 @@ fn values_too_large_to_decode_are_refused() {
     let run = |change: fn(&mut Splats)| {
         let mut splats = sample(200, 56, 1);
         change(&mut splats);
-        let sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
         let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
         packer.pack(STEP, &Silent).map(|(packed, _)| packed.unpack().unwrap())
     };

@@ -62,7 +62,7 @@ pub(crate) fn options(change: impl FnOnce(&mut PackOptions)) -> PackOptions {
 }
 
 pub(crate) fn pack(splats: &Splats, step: f64, options: &PackOptions) -> (Packed, CompressReport) {
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     Packer::new(splats, &sensitivity, options).unwrap().pack(step, &Silent).unwrap()
 }
 

@@ -7,20 +7,15 @@ use lexisplat_sample::{SampleOptions, scene};
 
 use crate::common;
 
-fn packed(
-    splats: &Splats,
-    step: f64,
-    change: fn(&mut PackOptions),
-    promise: Option<TargetRecord>,
-) -> Vec<u8> {
+fn packed(splats: &Splats, step: f64, change: fn(&mut PackOptions), target: Option<TargetRecord>) -> Vec<u8> {
     let mut options = PackOptions::default();
     change(&mut options);
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     let packer = Packer::new(splats, &sensitivity, &options).unwrap();
     let (packed, _) = packer.pack(step, &Silent).unwrap();
     let mut bytes = Vec::new();
-    let reached = promise.is_some().then(|| ReachedRecord::new([28.5, 31.5, 25.0], 18, false));
-    let packed = packed.with_target(promise).with_reached(reached);
+    let reached = target.is_some().then(|| ReachedRecord::new([28.5, 31.5, 25.0], 18, false));
+    let packed = packed.with_target(target).with_reached(reached);
     LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
     bytes
 }
@@ -31,7 +26,7 @@ pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
     rich.geometry.extras =
         vec![Extra { name: "label".to_owned(), values: ExtraValues::U8((0..60).collect()) }];
     rich.sh_rest[90..99].fill(1e6);
-    let promise = TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false);
+    let target = TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false);
     let change = |o: &mut PackOptions| {
         o.tolerance = Some(0.05);
         o.keep_order = true;
@@ -40,7 +35,7 @@ pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
     let flat = plain.with_degree_cut(ShDegree::ZERO);
     let one = scene(&SampleOptions::new(1, 4)).with_degree_cut(ShDegree::ZERO);
     vec![
-        ("rich", packed(&rich, 1e-4, change, Some(promise))),
+        ("rich", packed(&rich, 1e-4, change, Some(target))),
         ("plain", packed(&plain, 1e-4, |_| (), None)),
         ("flat", packed(&flat, 1e-3, |_| (), None)),
         // Where one wrong value does not make all that follow it garbage, which would be refused anyway.

@@ -26,7 +26,7 @@ pub(crate) fn change_tensor(parts: &mut Parts, names: &[&str], random: &mut Rand
 }
 
 pub(crate) fn change_metadata(parts: &mut Parts, random: &mut Random) {
-    let keys = ["gaussians", "degree", "layout", "version", "promise", "reached", "tolerance"];
+    let keys = ["gaussians", "degree", "layout", "version", "target", "reached", "tolerance"];
     let values = ",0,1,2,3,4,5,14,15,59,61,180,256,1024,1025,4000,32769,4294967294,18446744073709551615,-1,nan,\
         inf,0.5,f32,paper,packed,null,{},{\"target\":\"psnr\"}";
     let values: Vec<&str> = values.split(',').map(str::trim).collect();

@@ -57,7 +57,7 @@ pub(super) struct LexiFacts<'a> {
 #[derive(Serialize)]
 struct PackedFacts<'a> {
     removed: u64,
-    promise: Option<&'a TargetRecord>,
+    target: Option<&'a TargetRecord>,
     reached: Option<&'a ReachedRecord>,
     device: &'a str,
     order_kept: bool,
@@ -87,7 +87,7 @@ impl<'a> LexiFacts<'a> {
         let streams = &survey.stream_bits;
         let packed = lexi.packed_head().map(|head| PackedFacts {
             removed: head.removed,
-            promise: head.target.as_ref(),
+            target: head.target.as_ref(),
             reached: head.reached.as_ref(),
             device: head.device.as_deref().unwrap_or(CPU),
             order_kept: lexi.order_kept(),
@@ -141,7 +141,7 @@ impl<'a> LexiFacts<'a> {
     pub(super) fn quality(&self) -> Option<String> {
         let packed = self.packed.as_ref();
         let left_out = packed.filter(|packed| packed.removed > 0).map(|packed| removed_line(packed.removed));
-        let pictures = packed.and_then(|packed| record_line(packed.reached, packed.promise));
+        let pictures = packed.and_then(|packed| record_line(packed.reached, packed.target));
         let error =
             (packed.is_none() && self.atoms > 0).then(|| format!("SH error: {}", error_line(self.record)));
         let parts = [

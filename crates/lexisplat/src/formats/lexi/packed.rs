@@ -78,7 +78,7 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
     let known = |name: &str| name.starts_with(EXTRA_PREFIX) || PACKED.contains(&name);
     checked.refuse_unknown(known, "for layout 'packed'")?;
-    let target = checked.has_text(key::PROMISE).then(|| checked.json(key::PROMISE, target)).transpose()?;
+    let target = checked.has_text(key::TARGET).then(|| checked.json(key::TARGET, target)).transpose()?;
     let reached = checked.has_text(key::REACHED).then(|| checked.json(key::REACHED, reached)).transpose()?;
     check_extra_names(checked)?;
     data(checked)?;
@@ -93,8 +93,8 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
         target,
         reached,
         device: checked
-            .has_text(key::DRAWN_ON)
-            .then(|| checked.text(key::DRAWN_ON))
+            .has_text(key::DEVICE)
+            .then(|| checked.text(key::DEVICE))
             .transpose()?
             .map(str::to_owned),
         bytes: bytes.to_vec(),
@@ -104,7 +104,7 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
 
 fn target(json: &Json) -> Option<TargetRecord> {
     Some(TargetRecord {
-        target: json.get("target")?.text()?.to_owned(),
+        kind: json.get("kind")?.text()?.to_owned(),
         asked: json.get("asked")?.number()?,
         mean_psnr: json.get("mean_psnr")?.number()?,
         min_psnr: json.get("min_psnr")?.number()?,

@@ -81,8 +81,8 @@ pub(super) mod key {
     pub(crate) const OFFSET: &str = "offset";
     pub(crate) const GAUSSIANS: &str = "gaussians";
     pub(crate) const REMOVED: &str = "removed";
-    pub(crate) const PROMISE: &str = "promise";
+    pub(crate) const TARGET: &str = "target";
     pub(crate) const REACHED: &str = "reached";
-    pub(crate) const DRAWN_ON: &str = "drawn_on";
+    pub(crate) const DEVICE: &str = "device";
     pub(crate) const CHECKSUMS: &str = "checksums";
 }

@@ -113,9 +113,9 @@ impl<'a> LexiWriter<'a> {
         metadata.extend(tolerance.map(|tolerance| (key::TOLERANCE, tolerance.to_string())));
         metadata.extend([(key::GAUSSIANS, head.gaussians.to_string())]);
         metadata.extend((head.removed > 0).then(|| (key::REMOVED, head.removed.to_string())));
-        metadata.extend(head.target.as_ref().map(|target| (key::PROMISE, json(target))));
+        metadata.extend(head.target.as_ref().map(|target| (key::TARGET, json(target))));
         metadata.extend(head.reached.as_ref().map(|reached| (key::REACHED, json(reached))));
-        metadata.extend(head.device.clone().map(|device| (key::DRAWN_ON, device)));
+        metadata.extend(head.device.clone().map(|device| (key::DEVICE, device)));
         // What draws the scene comes first.
         let mut tensors = vec![
             list(tensor::HEAD, Dtype::U8, head.bytes.len(), Source::Bytes(&head.bytes)).sealed(),

@@ -29,8 +29,8 @@ mod tests {
         let mut back = vec![0; order.len()];
         (0..).zip(&order).for_each(|(k, &i)| back[i as usize] = k);
         assert_eq!(ordered.gathered(&back), splats);
-        let sensitivity = crate::Sensitivity::heuristic(&splats.geometry);
-        let of_ordered = crate::Sensitivity::heuristic(&ordered.geometry);
+        let sensitivity = crate::Sensitivity::guess(&splats.geometry);
+        let of_ordered = crate::Sensitivity::guess(&ordered.geometry);
         let scattered = of_ordered.scattered(&order);
         let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-4 * b.abs();
         assert!(scattered.colour.iter().zip(&sensitivity.colour).all(close));

@@ -156,7 +156,7 @@ mod tests {
 
     /// Weights of views that saw every fifth Gaussian, and by which moving and turning hardly shows.
     fn misleading(splats: &Splats) -> Sensitivity {
-        let mut s = Sensitivity::heuristic(&splats.geometry);
+        let mut s = Sensitivity::guess(&splats.geometry);
         for i in 0..splats.len() {
             let seen = if i % 5 == 0 { 1.0 } else { 1e-12 };
             s.colour[i] *= seen;

@@ -318,7 +318,7 @@ mod tests {
     #[test]
     fn other_appearances_change_nothing_else() {
         let splats = crate::support::testing::scene(700, 5);
-        let sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
         let options = PackOptions::default();
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
@@ -346,7 +346,7 @@ mod tests {
     #[test]
     fn appearances_that_do_not_fit_are_refused() {
         let splats = crate::support::testing::scene(50, 5);
-        let sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
         let options = PackOptions::default();
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(1e-5, true, &Silent).unwrap();

@@ -104,7 +104,7 @@ mod tests {
         let mut splats = scene(600, 2);
         let numbers = ExtraValues::U32((0..600).collect());
         splats.geometry.extras = vec![Extra { name: "number".into(), values: numbers }];
-        let mut sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let mut sensitivity = Sensitivity::guess(&splats.geometry);
         sensitivity.removal.fill(0.01);
         for i in (0..600).step_by(5) {
             sensitivity.opacity[i] = 1e-20;

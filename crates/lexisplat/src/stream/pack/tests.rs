@@ -82,13 +82,13 @@ fn streamed_with(
 fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
     for count in [MOST_CHUNK + 500, 700, 0] {
         let splats = scene(count);
-        let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
-        let sensitivity = Sensitivity::heuristic_part(&splats.geometry, total);
+        let total = guessed_total(0.0, &splats.geometry) / SHOWN;
+        let sensitivity = Sensitivity::guess_of_part(&splats.geometry, total);
         let (found, done) = streamed(&splats, None, BUCKET).unwrap();
         // A judge that says of each Gaussian what the guess says.
         let mut told = Told::by(|part: &Splats| {
             assert_eq!(part.len(), splats.len());
-            Ok(Sensitivity::heuristic_part(&part.geometry, total))
+            Ok(Sensitivity::guess_of_part(&part.geometry, total))
         });
         assert!(streamed(&splats, Some(&mut told), BUCKET).unwrap().0 == found, "{count}");
         let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
@@ -107,7 +107,7 @@ fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
 /// Without every fifth Gaussian pictures stay as they are.
 fn shown(part: &Splats, total: f64) -> Sensitivity {
     let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
-    let mut sensitivity = Sensitivity::heuristic_part(&part.geometry, total);
+    let mut sensitivity = Sensitivity::guess_of_part(&part.geometry, total);
     sensitivity.removal.fill(0.5);
     for (opacity, _) in sensitivity.opacity.iter_mut().zip(numbers).filter(|(_, n)| n.is_multiple_of(5)) {
         *opacity = 1e-25;
@@ -119,7 +119,7 @@ fn shown(part: &Splats, total: f64) -> Sensitivity {
 fn what_is_not_worth_its_bits_is_left_out() {
     let options = PackOptions { keep_order: false, ..options() };
     let splats = scene(MOST_CHUNK + 9000);
-    let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+    let total = guessed_total(0.0, &splats.geometry) / SHOWN;
     let packer = Packer::new(&splats, &shown(&splats, total), &options).unwrap();
     let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
     let mut expected = Vec::new();
@@ -148,7 +148,7 @@ fn what_is_not_worth_its_bits_is_left_out() {
 fn appearances_are_fitted_part_by_part() {
     let options = PackOptions { keep_order: false, ..options() };
     let splats = scene(MOST_CHUNK + 9000);
-    let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+    let total = guessed_total(0.0, &splats.geometry) / SHOWN;
     let others = |model: &Model| -> Vec<Appearance> {
         let moved = |i| {
             let Appearance { dc, log_opacity } = Appearance::of(model.geometry(), i);
@@ -195,7 +195,7 @@ fn one_gaussian_stays() {
     let splats = scene(9000);
     let small = 3000;
     let mut told = Told::by(|part: &Splats| {
-        let mut none = Sensitivity::heuristic(&part.geometry);
+        let mut none = Sensitivity::guess(&part.geometry);
         none.removal.fill(0.5);
         none.opacity.fill(0.0);
         Ok(none)
@@ -232,7 +232,7 @@ fn every_gaussian_is_judged_once_beside_its_neighbours() {
         let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
         seen.extend_from_slice(numbers);
         parts += 1;
-        Ok(Sensitivity::heuristic(&part.geometry))
+        Ok(Sensitivity::guess(&part.geometry))
     });
     let (found, _) = streamed(&splats, Some(&mut told), small).unwrap();
     assert_eq!(parts, 4);

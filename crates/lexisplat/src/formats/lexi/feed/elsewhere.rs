@@ -11,7 +11,7 @@ use super::LexiFeed;
 /// # use lexisplat::packed::{PackOptions, Packer};
 /// # use lexisplat::{Limits, Sensitivity, Silent, lexi};
 /// # let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(2000, 0));
-/// # let sensitivity = Sensitivity::heuristic(&splats.geometry);
+/// # let sensitivity = Sensitivity::guess(&splats.geometry);
 /// # let packer = Packer::new(&splats, &sensitivity, &PackOptions::default())?;
 /// # let (packed, _) = packer.pack(packer.step_for(40.0), &Silent)?;
 /// # let mut file = Vec::new();

@@ -16,7 +16,7 @@ fn packed(row: Option<f32>, viewpoints: Vec<[f32; 3]>) -> Packed {
     }
     let mut options = PackOptions::default();
     (options.atoms, options.viewpoints) = (Some(20), viewpoints);
-    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
     Packer::new(&splats, &sensitivity, &options).unwrap().pack(1e-5, &Silent).unwrap().0
 }
 

@@ -132,8 +132,8 @@ impl Bucket {
     pub fn look(&self, plan: &Plan, observed: Option<Observed>) -> Result<(LookStatistics, Looked)> {
         let (Observed { sensitivity, memo, .. }, scale) = match observed {
             None => {
-                let total = plan.heuristic_total / SHOWN;
-                (Sensitivity::heuristic_part(&self.splats.geometry, total).into(), 1.0)
+                let total = plan.guessed_total / SHOWN;
+                (Sensitivity::guess_of_part(&self.splats.geometry, total).into(), 1.0)
             }
             Some(mut observed) => {
                 observed.check()?;

@@ -12,7 +12,7 @@ use crate::packed::encode::removal::{changes_without, is_worth_its_bits};
 use crate::scene::sensitivity::Sensitivity;
 use crate::support::error::{Error, Result};
 
-/// Sum of the squared weights that views measure. The heuristic scales its weights to a sum of 1, but squares sum
+/// Sum of the squared weights that views measure. A guess scales its weights to a sum of 1, but squares sum
 /// to less where several Gaussians share a pixel or none covers it. Without this factor files came out 7 to 9 dB
 /// better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
 pub(crate) const SHOWN: f64 = 0.1;

@@ -41,7 +41,7 @@ pub struct Plan {
     firsts: Vec<u64>,
     pub(super) grid: Grid,
     /// Sum of the expected weights of all Gaussians.
-    pub(super) heuristic_total: f64,
+    pub(super) guessed_total: f64,
     pub(super) like: Like,
     /// Where buckets end but the last: of all tiles, or of each on its own.
     ends: Vec<Vec<MortonKey>>,
@@ -77,7 +77,7 @@ impl Plan {
         let offset = shared_offset(tiles);
         let mut firsts = vec![0_u64];
         let mut bounds: Option<Bounds> = None;
-        let mut heuristic_total = 0.0;
+        let mut guessed_total = 0.0;
         let mut looked: Vec<(usize, Vec3, u64)> = Vec::new();
         let mut total = 0_u64;
         for (number, (name, blocks)) in tiles.iter().enumerate() {
@@ -95,7 +95,7 @@ impl Plan {
                 if let Some(own) = block.bounds.map(|own| own.rebased(from, offset)) {
                     bounds.get_or_insert(own).add(own);
                 }
-                heuristic_total += block.heuristic_total;
+                guessed_total += block.guessed_total;
                 total = total.saturating_add(block.gaussians);
             }
             firsts.push(total);
@@ -124,7 +124,7 @@ impl Plan {
         let ends = (0..count).map(ends_of).collect();
         let step = expected_step(gaussians, decibels);
         let mut plan =
-            Self { scene: 0, options: options.clone(), step, firsts, grid, heuristic_total, like, ends };
+            Self { scene: 0, options: options.clone(), step, firsts, grid, guessed_total, like, ends };
         // With its own checksum at the end, the checksum of any message is the same.
         let bytes = plan.to_bytes();
         plan.scene = crc32::hash(bytes.split_last_chunk::<{ message::CHECKSUM }>().map_or(&[], |b| b.0));

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::message::messages;
 use crate::packed::encode::canonical::Bounds;
 use crate::scene::extra::ScalarType;
-use crate::scene::sensitivity::heuristic_total;
+use crate::scene::sensitivity::guessed_total;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{SceneMeta, Splats};
@@ -30,7 +30,7 @@ pub struct Survey {
     pub(super) gaussians: u64,
     pub(super) bounds: Option<Bounds>,
     /// Sum of the expected weights of all.
-    pub(super) heuristic_total: f64,
+    pub(super) guessed_total: f64,
     /// Rows of the block and their positions, one of every [`STRIDE`] rows.
     pub(super) positions: Vec<(u32, Vec3)>,
     pub(super) like: Like,
@@ -104,7 +104,7 @@ impl Survey {
         let mut survey = Self {
             gaussians: rows.len() as u64,
             bounds: None,
-            heuristic_total: 0.0,
+            guessed_total: 0.0,
             positions: Vec::with_capacity(rows.len().div_ceil(STRIDE)),
             like: Like::of(&part),
         };
@@ -115,7 +115,7 @@ impl Survey {
             let (own, geometry) = (start..start + part.len(), &part.geometry);
             let bounds = Bounds::of(&geometry.positions);
             survey.bounds.get_or_insert(bounds).add(bounds);
-            survey.heuristic_total = heuristic_total(survey.heuristic_total, geometry);
+            survey.guessed_total = guessed_total(survey.guessed_total, geometry);
             while let Some(row) = chosen.next_if(|row| own.contains(row)) {
                 // Blocks have few rows.
                 let number = u32::try_from(row - rows.start).unwrap_or(u32::MAX);

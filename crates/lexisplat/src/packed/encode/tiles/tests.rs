@@ -217,7 +217,7 @@ fn a_bucket_that_asks_for_half_the_step_weighs_four_times_as_much() {
     let mut reader = BucketReader::new(&plan, 0);
     reader.add(0, &tiles[0], 0..3000, &Silent).unwrap();
     let bucket = reader.finish();
-    let own = Sensitivity::heuristic(&bucket.splats().geometry);
+    let own = Sensitivity::guess(&bucket.splats().geometry);
     let looked = |step_factor: f64| {
         bucket.look(&plan, Some(Observed { step_factor, ..own.clone().into() })).map(|pair| pair.1)
     };
