@@ -78,8 +78,9 @@ pub(crate) fn find(
         let count = of_kind.len() as f64;
         let ranked = of_kind.into_iter().enumerate();
         // Views through clutter have the most detail, so each kind is ranked on its own.
-        seen.extend(ranked.map(|(rank, (_, lit, camera))| Seen {
-            rank: (rank as f64 + 0.5) / count,
+        seen.extend(ranked.map(|(place, (_, lit, camera))| Seen {
+            rank: (place as f64 + 0.5) / count,
+            may_judge: place.is_multiple_of(2),
             lit,
             camera,
         }));
@@ -91,10 +92,10 @@ pub(crate) fn find(
     let clear = |view: &Seen| view.lit >= LEAST_LIT * median;
     // Views past the scene come last.
     seen.sort_by(|a, b| clear(b).cmp(&clear(a)).then(a.rank.total_cmp(&b.rank)));
-    // The best take turns to judge and to measure, as long as judges are needed.
+    // The best of each kind take turns to judge and to measure, as long as judges are needed.
     let (mut best, mut judges) = (Vec::new(), Vec::new());
-    for (rank, Seen { camera, .. }) in seen.into_iter().enumerate() {
-        if rank.is_multiple_of(2) && judges.len() < judging {
+    for Seen { camera, may_judge, .. } in seen {
+        if may_judge && judges.len() < judging {
             judges.push(camera);
         } else if best.len() < measuring {
             best.push(camera);
@@ -115,6 +116,8 @@ pub(crate) fn find(
 struct Seen {
     /// Its rank by detail among those of its kind, as a share of their number.
     rank: f64,
+    /// Whether it may judge: every second one of its kind.
+    may_judge: bool,
     /// The share of pixels that show something.
     lit: f64,
     camera: Camera,
