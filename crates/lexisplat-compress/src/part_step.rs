@@ -10,16 +10,17 @@ use crate::packing_views::PackingViews;
 use crate::refit::GAIN_FOUND;
 use crate::target::{DB_PER_HALVING, on_grid};
 
-/// Steps in an octave. Scores of one scene in two units differ by 0.1 dB, and finer ones would often give them different steps.
+/// Steps in an octave. Scores of one small scene in two units differ by up to 1 dB, which is a fifth of an octave, and finer steps
+/// would often differ too.
 const STEPS_PER_OCTAVE: f64 = 2.0;
-/// Number of files that are made.
-const FILES: usize = 2;
+/// Number of files that are made at most.
+const MOST_FILES: usize = 4;
 /// Largest change of the step's binary logarithm by one file.
 const MOST_MOVE: f64 = 2.0;
 
-/// The factor of the usual step with which pictures of `part`, packed as a scene of its own by `views` and the `sensitivity` that
-/// they measure, have about `decibels`. A file at the usual step says where a second is, and the second says by how much to
-/// correct. Neither is refitted: [`GAIN_FOUND`] stands for that. With a second file that is refitted, and steps of
+/// Returns the factor of the usual step with which pictures of `part` have about `decibels`. The part is packed as a scene of its
+/// own, by `views` and the `sensitivity` that they measure. A file at one step says what the next step is, until a file keeps its
+/// step. No file is refitted: [`GAIN_FOUND`] stands for the gain of refitting. With a second file that is refitted, and steps of
 /// quarter octaves, three copies of room-large in five parts had the same steps, in 27 % more time.
 ///
 /// # Errors
@@ -38,12 +39,16 @@ pub(crate) fn step_factor(
     // A GPU that looks need not judge too.
     let mut judge = Judge::of_part(Renderer::cpu(), part, &views.judging_part(), progress)?;
     let mut log_step = on_grid(usual, STEPS_PER_OCTAVE);
-    for _ in 0..FILES {
+    for _ in 0..MOST_FILES {
         let (file, _) =
             packer.quantise(libm::exp2(log_step), true, progress)?.finish(None, None, progress)?;
         let reached = judge.score(&file.unpack()?, progress)?.judged + gain;
         let by = ((reached - decibels) / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE);
-        log_step = on_grid(log_step + by, STEPS_PER_OCTAVE);
+        let next = on_grid(log_step + by, STEPS_PER_OCTAVE);
+        if next == log_step {
+            break;
+        }
+        log_step = next;
     }
     Ok(libm::exp2(log_step - usual))
 }
