@@ -123,6 +123,16 @@ struct Seen {
     camera: Camera,
 }
 
+/// Returns `count` natural views of `splats`, evenly spread over its opaque Gaussians in their order. Of each few neighbours it is
+/// the view in which Gaussians look most alike in size.
+pub(crate) fn evenly(splats: &Splats, count: usize) -> Vec<Camera> {
+    let views = natural_views(&splats.geometry, CHOICE * count, SIZE);
+    let sizes = Sizes::of(&splats.geometry);
+    let spread = |view: &&Camera| sizes.seen_from(view.position).spread;
+    let least = |few: &[Camera]| few.iter().min_by(|a, b| spread(a).total_cmp(&spread(b))).cloned();
+    views.chunks(CHOICE).filter_map(least).collect()
+}
+
 /// `count` natural views of `splats` to try: some from where photographs were likely taken, and others from where Gaussians look
 /// most alike in size. The former are none if no colour depends on the view.
 fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {

@@ -18,9 +18,10 @@ const MEMORY: u64 = 320_000_000;
 const MEMORY_PER_TEN_BYTES: u64 = 26;
 /// Bytes of memory that the program and the Python package allow by default for packing a whole scene.
 pub const DEFAULT_MEMORY: u64 = 4 << 30;
-/// Most Gaussians of a scene without cameras that is packed whole. A larger one is looked at too little as a whole: files in
-/// parts are 3 % larger at equal quality for 1.2 million Gaussians, and 46 % smaller for 3.2 million (docs/results/sizes.md).
-const MOST_WHOLE: u64 = 1_572_864;
+/// Most Gaussians of a scene without cameras that is packed whole. Pictures of a larger one as a whole show each of its Gaussians too
+/// seldom: files in parts are 4 % larger at equal quality for 0.4 million Gaussians, and 25 % smaller for 1.2 million
+/// (docs/results/sizes.md).
+const MOST_WHOLE: u64 = 786_432;
 
 /// Name of [`Packing::with_max_gaussians`] in errors.
 const MAX_GAUSSIANS: &str = "max-gaussians";

@@ -5,7 +5,7 @@ use lexisplat::{Geometry, Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
 
 use crate::error::{Error, Result};
-use crate::found::{Found, find};
+use crate::found::{Found, evenly, find};
 use crate::sharp_views::sampled;
 use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints};
 
@@ -27,6 +27,11 @@ const FOUND_JUDGE_SHARE: usize = 4;
 pub(crate) const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Distances of generated views that measure, in radii of the scene's detail.
 const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
+/// Number of views that measure a part of a large scene beside those of a whole one. They are evenly spread over its Gaussians. A part
+/// may have some Gaussians far from all others, and views like photographs of the part seldom show those.
+const EVEN_VIEWS: usize = 96;
+/// One of this many of them judges instead.
+const EVEN_JUDGE_SHARE: usize = 4;
 /// Number of generated views that judge.
 const JUDGES: usize = 24;
 /// Pixels that measure, in all views together: so many, and so many more for each Gaussian, but no more than the last. Of
@@ -144,6 +149,8 @@ fn found_views(splats: &Splats) -> [usize; 2] {
 pub struct PackingViews {
     measuring: Vec<Camera>,
     judging: Vec<Camera>,
+    /// Views that judge a part of a large scene, evenly spread over its Gaussians.
+    even: Vec<Camera>,
     given: bool,
 }
 
@@ -159,7 +166,26 @@ impl PackingViews {
         let counts = found_views(splats);
         let Found { best, judges } = find(renderer, splats, every_second(1).collect(), counts, progress)?;
         let measuring = every_second(0).chain(best).collect();
-        Ok(Self { measuring, judging: judges, given: false })
+        Ok(Self { measuring, judging: judges, even: Vec::new(), given: false })
+    }
+
+    /// [`Self::found`] of a part of a scene, whose Gaussians are in the order of a curve. [`EVEN_VIEWS`] more measure.
+    pub(crate) fn found_of_part(
+        renderer: &mut Renderer,
+        part: &Splats,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let mut views = Self::found(renderer, part, progress)?;
+        let Some([width, height]) = views.judging.first().map(|camera| [camera.width, camera.height]) else {
+            return Ok(views);
+        };
+        let even = evenly(part, EVEN_VIEWS);
+        for (k, camera) in even.iter().enumerate() {
+            let judges = k.is_multiple_of(EVEN_JUDGE_SHARE);
+            let views = if judges { &mut views.even } else { &mut views.measuring };
+            views.push(camera.resized(width, height));
+        }
+        Ok(views)
     }
 
     /// Views of `splats` from `viewpoints`: half of the views that measure and all views that
@@ -183,12 +209,12 @@ impl PackingViews {
         measuring.extend(views(&splats.geometry, measuring.len(), width, height));
         // A number of its own, so that most of these are not among those that measure.
         let judging = views(&splats.geometry, JUDGES - 1, width, height);
-        Ok(Self { measuring, judging, given: false })
+        Ok(Self { measuring, judging, even: Vec::new(), given: false })
     }
 
     /// Views that were found before.
     pub(crate) fn of_found(measuring: Vec<Camera>, judging: Vec<Camera>) -> Self {
-        Self { measuring, judging, given: false }
+        Self { measuring, judging, even: Vec::new(), given: false }
     }
 
     /// Takes the given cameras. If some are marked as training cameras, takes only those.
@@ -206,7 +232,7 @@ impl PackingViews {
         let sharp = |camera: &Camera| camera.with_max_width(DEFAULT_MAX_WIDTH);
         let measuring: Vec<Camera> = used.into_iter().step_by(stride).map(sharp).collect();
         let judging = measuring.iter().skip(1).step_by(JUDGE_SHARE).cloned().collect();
-        Ok(Self { measuring, judging, given: true })
+        Ok(Self { measuring, judging, even: Vec::new(), given: true })
     }
 
     /// Whether the cameras were given. Otherwise they were generated.
@@ -236,6 +262,11 @@ impl PackingViews {
     /// [`Self::some_judging`] of a part of a scene, which draw fewer pixels.
     pub(crate) fn judging_part(&self) -> Vec<Camera> {
         self.judging_by(PART_JUDGES, PART_JUDGED_PIXELS)
+    }
+
+    /// The views that judge a part of a scene and are evenly spread over its Gaussians.
+    pub(crate) fn judging_evenly(&self) -> Vec<Camera> {
+        sampled(self.even.clone(), PART_JUDGED_PIXELS)
     }
 
     fn judging_by(&self, most: usize, pixels: u64) -> Vec<Camera> {

@@ -15,6 +15,8 @@ use crate::target::{DB_PER_HALVING, on_grid};
 const STEPS_PER_OCTAVE: f64 = 2.0;
 /// Number of files that are made at most.
 const MOST_FILES: usize = 4;
+/// Views that are evenly spread over a part may show less than views like photographs by this many decibels.
+const EVEN_MARGIN: f64 = 1.0;
 /// Largest change of the step's binary logarithm by one file.
 const MOST_MOVE: f64 = 2.0;
 
@@ -38,11 +40,19 @@ pub(crate) fn step_factor(
     let gain = if options.may_change() { GAIN_FOUND } else { 0.0 };
     // A GPU that looks need not judge too.
     let mut judge = Judge::of_part(Renderer::cpu(), part, &views.judging_part(), progress)?;
+    let even = views.judging_evenly();
+    let mut evenly =
+        (!even.is_empty()).then(|| Judge::of_part(Renderer::cpu(), part, &even, progress)).transpose()?;
     let mut log_step = on_grid(usual, STEPS_PER_OCTAVE);
     for _ in 0..MOST_FILES {
         let (file, _) =
             packer.quantise(libm::exp2(log_step), true, progress)?.finish(None, None, progress)?;
-        let reached = judge.score(&file.unpack()?, progress)?.judged + gain;
+        let unpacked = file.unpack()?;
+        let mut reached = judge.score(&unpacked, progress)?.judged;
+        if let Some(evenly) = &mut evenly {
+            reached = reached.min(evenly.score(&unpacked, progress)?.judged + EVEN_MARGIN);
+        }
+        let reached = reached + gain;
         let by = ((reached - decibels) / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE);
         let next = on_grid(log_step + by, STEPS_PER_OCTAVE);
         if next == log_step {

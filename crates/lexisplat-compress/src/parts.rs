@@ -88,7 +88,7 @@ pub(crate) fn observe(
     }
     // The work around it counts Gaussians.
     let progress = &OnlyCancels(progress);
-    let views = PackingViews::found(renderer, part, progress)?;
+    let views = PackingViews::found_of_part(renderer, part, progress)?;
     let sensitivity = views.sensitivity(renderer, part, progress)?;
     let step_factor = step_factor(part, &views, &sensitivity, options, decibels, progress)?;
     Ok(Observed { sensitivity, step_factor, memo: memo_of(&views) })

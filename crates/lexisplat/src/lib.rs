@@ -47,8 +47,19 @@
 //! files, [`Splats`] and [`Model`] what they hold. docs/METHOD.md has the mathematics, docs/FORMAT.md the
 //! file.
 //!
-//! The features `parallel` and `mmap` are on by default. Without them the crate needs neither threads nor
-//! files and builds for `wasm32-unknown-unknown`; results are the same bit for bit.
+//! The features `encode`, `parallel` and `mmap` are on by default. Without `encode` the crate reads every file, and neither learns
+//! nor packs. Without the other two it needs neither threads nor files and builds for `wasm32-unknown-unknown`; results are the
+//! same bit for bit.
+
+#![cfg_attr(
+    not(feature = "encode"),
+    allow(
+        dead_code,
+        unreachable_pub,
+        unused_imports,
+        reason = "encoder and decoder of the syntax are one function; the encoder calls more of it"
+    )
+)]
 
 mod formats;
 pub mod packed;
@@ -71,10 +82,13 @@ pub use scene::splats::{FLAT_SCALE, Geometry, SURE_OPACITY, SceneMeta, Splats, f
 pub use scene::{sh, stats};
 pub use sparse::atoms::{Atoms, MAX_DIM};
 pub use sparse::codes::{CodedRest, Column, Escapes, Indices, SparseCodes, Values, reconstruct};
+#[cfg(feature = "encode")]
 pub use sparse::compress::{CompressOptions, DEFAULT_TOLERANCE, compress};
 pub use sparse::dictionary::Dictionary;
 pub use sparse::model::{Model, Pursuit, Record};
+#[cfg(feature = "encode")]
 pub use sparse::tally::CompressReport;
+#[cfg(feature = "encode")]
 pub use sparse::{learn, pursuit};
 pub use support::error::{Error, FormatError, Result};
 pub use support::input::Input;

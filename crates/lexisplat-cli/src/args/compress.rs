@@ -120,7 +120,7 @@ pub(crate) struct Compress {
     #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "views"])]
     pub(crate) guess: bool,
     /// Approximate memory that packing a whole scene may take, such as 500MB. A scene that needs more is packed in
-    /// parts, each drawn on its own, and so is one of more than 1,572,864 Gaussians without cameras. The only targets are
+    /// parts, each drawn on its own, and so is one of more than 786,432 Gaussians without cameras. The only targets are
     /// then --preset and --psnr. Packing in parts takes up to 1.5 GiB, however small BYTES is. Files of the other
     /// layouts do not depend on it.
     #[arg(long, default_value = "4GiB", value_name = "BYTES", value_parser = size)]

@@ -9,29 +9,38 @@
 //! or reads them.
 
 mod bitstream;
+mod curve;
 mod decode;
+#[cfg(feature = "encode")]
 mod encode;
 mod entropy;
+mod preset;
 mod scene;
 
 pub(crate) use bitstream::atoms_of_head;
 pub(crate) use bitstream::stream::BitCounts;
+#[cfg(feature = "encode")]
+pub(crate) use curve::MortonKey;
 pub(crate) use decode::available_ranges::{AvailableRanges, Data, DecodeOptions};
 pub(crate) use decode::decoder::Decoder;
-pub(crate) use encode::canonical::MortonKey;
-#[cfg(test)]
+#[cfg(all(test, feature = "encode"))]
 pub(crate) use encode::layering::MOST_CHUNK;
+#[cfg(feature = "encode")]
 pub(crate) use scene::SpilledPacked;
 
 pub use bitstream::stream::StreamBits;
+pub use curve::curve_order;
 pub use decode::outline::{ChunkOutline, LayerOutline, Outline, RangeKind, RangeOutline};
+#[cfg(feature = "encode")]
 pub use encode::appearance::{Appearance, AppearanceChange};
-pub use encode::curve::curve_order;
+#[cfg(feature = "encode")]
 pub use encode::pack::{PackOptions, Packer};
-pub use encode::preset::Preset;
+#[cfg(feature = "encode")]
 pub use encode::quantised::{Quantised, Refit};
+#[cfg(feature = "encode")]
 pub use encode::tiles;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub use entropy::fuzzing;
+pub use preset::Preset;
 pub use scene::{Packed, PackedHead, ReachedRecord, TargetRecord};

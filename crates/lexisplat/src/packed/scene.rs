@@ -141,6 +141,7 @@ impl Packed {
 }
 
 /// What of a packed scene is as long as the scene, spilled.
+#[cfg(feature = "encode")]
 #[derive(Debug)]
 pub(crate) struct SpilledPacked {
     pub(crate) data: Woven,

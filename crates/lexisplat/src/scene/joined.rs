@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use crate::packed::tiles::Survey;
 use crate::scene::offset::{Offset, shift};
 use crate::scene::rounding::Rounding;
 use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::Splats;
+use crate::scene::tile_kind::TileKind;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 
@@ -43,7 +43,7 @@ impl<'a> Joined<'a> {
         let (mut warnings, mut offsets) = (Vec::new(), Vec::new());
         for (name, tile) in tiles {
             let own = tile.empty();
-            Survey::check_tile(name, empty.as_ref(), &own, tile.len())?;
+            TileKind::of(&own).check(name, empty.as_ref().map(TileKind::of).as_ref(), tile.len() as u64)?;
             offsets.push((own.meta.offset, tile.len() as u64));
             empty.get_or_insert_with(|| own.clone()).meta.join(&own.meta);
             warnings.extend(tile.warnings().iter().map(|warning| format!("{name}: {warning}")));

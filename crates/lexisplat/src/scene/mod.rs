@@ -7,6 +7,8 @@ pub(crate) mod rounding;
 pub(crate) mod sensitivity;
 pub mod sh;
 pub(crate) mod source;
+#[cfg(feature = "encode")]
 pub(crate) mod spilled;
 pub(crate) mod splats;
 pub mod stats;
+pub(crate) mod tile_kind;

@@ -1,6 +1,6 @@
 //! Unit-norm atoms of any length. A [`Dictionary`](crate::Dictionary) is atoms of the length that an SH degree has.
 
-use crate::sparse::pursuit::RowValue;
+use crate::sparse::row_value::RowValue;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 

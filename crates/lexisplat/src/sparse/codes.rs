@@ -4,12 +4,20 @@ use half::f16;
 use half::slice::HalfFloatSliceExt;
 
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::pursuit::ValueType;
 use crate::support::error::{Error, Result};
 use crate::support::maths::name_of;
 
 /// Gaussians between two stored offsets. To find a column, fewer than this many counts are added up.
 const GAUSSIANS_PER_CHECKPOINT: usize = 64;
+
+/// Precision of the stored values. The error is verified after the values are rounded to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ValueType {
+    /// 32-bit float.
+    F32,
+    /// 16-bit float.
+    F16,
+}
 
 /// Atom numbers. They take one byte each if the dictionary has at most 256 atoms.
 #[derive(Debug, Clone, PartialEq, Eq)]

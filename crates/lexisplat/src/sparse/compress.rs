@@ -15,14 +15,12 @@ use crate::sparse::tally::{CompressReport, Tally};
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
-use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
+use crate::support::parallel::{AT_ONCE, GAUSSIANS_PER_TASK, map_chunks};
 use crate::support::progress::{Progress, Stage};
 use crate::support::stopwatch::Stopwatch;
 
 /// The paper's main tolerance.
 pub const DEFAULT_TOLERANCE: f64 = 0.1;
-/// Gaussians coded before their codes are appended. It bounds the codes that are in memory twice.
-pub(crate) const AT_ONCE: usize = 32 * GAUSSIANS_PER_TASK;
 
 /// How to compress.
 #[derive(Debug, Clone, PartialEq)]

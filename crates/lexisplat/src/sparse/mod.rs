@@ -2,9 +2,14 @@
 
 pub(crate) mod atoms;
 pub(crate) mod codes;
+#[cfg(feature = "encode")]
 pub(crate) mod compress;
 pub(crate) mod dictionary;
+#[cfg(feature = "encode")]
 pub mod learn;
 pub(crate) mod model;
+#[cfg(feature = "encode")]
 pub mod pursuit;
+mod row_value;
+#[cfg(feature = "encode")]
 pub(crate) mod tally;

@@ -2,11 +2,12 @@
 
 use crate::formats::lexi::{CodeLayout, LexiWriter, SpilledModel, sh_bytes};
 use crate::scene::source::SplatSource;
-use crate::sparse::compress::{AT_ONCE, CompressOptions, Encoded, encode};
+use crate::sparse::compress::{CompressOptions, Encoded, encode};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Record;
 use crate::sparse::tally::CompressReport;
 use crate::support::error::Result;
+use crate::support::parallel::AT_ONCE;
 use crate::support::progress::Progress;
 use crate::support::sink::Sink;
 use crate::support::spill::SpillTo;

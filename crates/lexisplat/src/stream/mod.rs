@@ -27,21 +27,29 @@
 //! ```
 
 mod buckets;
+#[cfg(feature = "encode")]
 mod compress;
 mod decompress;
+#[cfg(feature = "encode")]
 mod observer;
+#[cfg(feature = "encode")]
 mod order;
+#[cfg(feature = "encode")]
 mod pack;
 mod rows;
 mod source_order;
 mod survey;
 
+#[cfg(feature = "encode")]
 pub use compress::{Compressed, compress};
 pub use decompress::decompress;
+#[cfg(feature = "encode")]
 pub use observer::{Observed, Observer};
-#[cfg(test)]
+#[cfg(all(test, feature = "encode"))]
 pub(crate) use pack::run as pack_in_buckets;
+#[cfg(feature = "encode")]
 pub use pack::{PackedFile, pack};
+#[cfg(feature = "encode")]
 pub(crate) use rows::RowLayout;
 pub use source_order::in_source_order;
 pub use survey::{Survey, lint, survey};
@@ -50,8 +58,8 @@ use std::ops::Range;
 
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
-use crate::sparse::compress::AT_ONCE;
 use crate::support::error::Result;
+use crate::support::parallel::AT_ONCE;
 use crate::support::progress::Progress;
 
 /// Reads Gaussians `rows` of `source` into `splats`, [`AT_ONCE`] of them at a time, and hands `take` the number of the first of

@@ -8,6 +8,8 @@ use std::ops::Range;
 
 /// Gaussians that one task handles: enough to hide the cost of a task, few enough to balance the threads.
 pub(crate) const GAUSSIANS_PER_TASK: usize = 2048;
+/// Gaussians that are read or coded at once. It bounds the values that are in memory twice.
+pub(crate) const AT_ONCE: usize = 32 * GAUSSIANS_PER_TASK;
 
 /// Calls `f` with consecutive ranges of at most `chunk` that cover `0..len`; results in order.
 pub(crate) fn map_chunks<T: Send>(len: usize, chunk: usize, f: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {

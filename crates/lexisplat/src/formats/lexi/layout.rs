@@ -1,7 +1,7 @@
 //! Layouts of .lexi files.
 
+use crate::sparse::codes::ValueType;
 use crate::sparse::model::named;
-use crate::sparse::pursuit::ValueType;
 
 /// Layout of a .lexi file, by the name in its header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

@@ -17,6 +17,7 @@ mod layout;
 mod packed;
 mod reader;
 mod schema;
+#[cfg(feature = "encode")]
 mod spilled;
 mod tensors;
 mod write;
@@ -26,6 +27,7 @@ pub use feed::{FeedOptions, LexiFeed};
 pub use layout::{CodeLayout, Layout};
 pub use reader::{LexiReader, read, read_bytes};
 pub use schema::{MAX_VERSION, PACKED_VERSION, VERSION};
+#[cfg(feature = "encode")]
 pub(crate) use spilled::SpilledModel;
 pub(crate) use write::sh_bytes;
 pub use write::{LexiWriter, write};

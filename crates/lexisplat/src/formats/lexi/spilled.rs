@@ -9,8 +9,8 @@ use super::write::{
 use crate::scene::source::SplatSource;
 use crate::scene::spilled::SpilledExtras;
 use crate::scene::splats::Geometry;
+use crate::sparse::codes::ValueType;
 use crate::sparse::compress::Coded;
-use crate::sparse::pursuit::ValueType;
 use crate::support::error::{Error, Result};
 use crate::support::spill::{Spill, SpillTo};
 

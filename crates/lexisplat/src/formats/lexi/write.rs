@@ -5,16 +5,19 @@ use safetensors::Dtype;
 use super::extra_column::ColumnEncoder;
 use super::layout::{CodeLayout, Layout};
 use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, PACKED_VERSION, VERSION, geometry_shape, key, tensor};
+#[cfg(feature = "encode")]
 use super::spilled::SpilledModel;
 use super::tensors::{Draft, Metadata, Source, Tensor, json, preamble};
-use crate::packed::{Packed, PackedHead, SpilledPacked};
+#[cfg(feature = "encode")]
+use crate::packed::SpilledPacked;
+use crate::packed::{Packed, PackedHead};
 use crate::scene::extra::{Extra, ExtraValues, ScalarType, for_extra, with_scalar};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::SceneMeta;
+use crate::sparse::codes::ValueType;
 use crate::sparse::codes::{Indices, Values};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Model, Pursuit, Record};
-use crate::sparse::pursuit::ValueType;
 use crate::support::error::Result;
 use crate::support::limits::Limits;
 use crate::support::progress::{Progress, Silent};
@@ -62,6 +65,7 @@ impl<'a> LexiWriter<'a> {
     }
 
     /// The exact file of a scene that was spilled.
+    #[cfg(feature = "encode")]
     pub(crate) fn spilled(
         spilled: SpilledModel,
         dictionary: &'a Dictionary,
@@ -77,6 +81,7 @@ impl<'a> LexiWriter<'a> {
     ///
     /// # Errors
     /// [`crate::Error::Io`] for temporary files.
+    #[cfg(feature = "encode")]
     pub(crate) fn spilled_packed(head: &'a PackedHead, spilled: SpilledPacked) -> Result<Self> {
         let SpilledPacked { data, order, extras } = spilled;
         let data_bytes = data.len();

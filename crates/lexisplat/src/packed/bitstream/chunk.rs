@@ -5,9 +5,9 @@ use super::geometry_syntax::{GeometrySyntax, Group};
 use super::integer_model::Steering;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest, RestForm};
+use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::decode::chunk_unpack::{Drawn, Frame};
-use crate::packed::encode::target::Target;
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::rans_encoder::SymbolRecorder;
 use crate::packed::entropy::symbols::{LANES, Lanes, has};
@@ -91,17 +91,17 @@ impl Form {
         &self,
         frame: &Frame,
         layer: LayerForm,
-        targets: &[Target],
+        coded: &[CodedGaussian],
     ) -> Option<CodedChunk> {
         let levels = layer.levels;
-        let lanes = lanes(targets.len());
-        let starts = starts(targets.len(), lanes);
+        let lanes = lanes(coded.len());
+        let starts = starts(coded.len(), lanes);
         let mut ranges = vec![SymbolRecorder::default(); layer.ranges()];
         let mut sums = vec![Sums::default(); layer.ranges()];
         let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, levels), Rest::default());
-        let none = Target::default();
+        let none = CodedGaussian::default();
         let mut bounds = Extent([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]);
-        let sets: Vec<u32> = sets(targets.len(), lanes).collect();
+        let sets: Vec<u32> = sets(coded.len(), lanes).collect();
         for (block, sets) in sets.chunks(BLOCK).enumerate() {
             let first = block * BLOCK;
             rest.clear();
@@ -109,12 +109,11 @@ impl Form {
             let (finer, parts) = finer.split_at_mut_checked(levels)?;
             let (parts, changed) = parts.split_at_mut_checked(layer.parts)?;
             for (i, &set) in sets.iter().enumerate() {
-                let of =
-                    |l: usize| targets.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
-                let group: [&Target; LANES] = std::array::from_fn(of);
-                let targets = group;
+                let of = |l: usize| coded.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
+                let group: [&CodedGaussian; LANES] = std::array::from_fn(of);
+                let coded = group;
                 let mut group = Group::default();
-                walk.base(base, set, Some(&targets), &mut group)?;
+                walk.base(base, set, Some(&coded), &mut group)?;
                 sums[0].base(set, &group);
                 for (k, range) in finer.iter_mut().enumerate() {
                     refine(range, set, &mut group, levels - k)?;
@@ -122,16 +121,16 @@ impl Form {
                 }
                 if let Some(range) = changed.first_mut() {
                     let wanted: [Lanes; CHANGES] =
-                        std::array::from_fn(|k| std::array::from_fn(|l| targets[l].interim[k]));
+                        std::array::from_fn(|k| std::array::from_fn(|l| coded[l].interim[k]));
                     interim(range, set, &mut group, &wanted);
                     sums[layer.interim_range()].interim(set, &group);
                 }
                 rest.push(set, group.colour);
                 bounds.add(set, &group, frame, levels)?;
             }
-            let wanted: Lanes<Vec<&Target>> = std::array::from_fn(|l| {
+            let wanted: Lanes<Vec<&CodedGaussian>> = std::array::from_fn(|l| {
                 let there = sets.iter().enumerate().filter(|(_, set)| has(**set, l));
-                there.filter_map(|(i, _)| targets.get(starts[l] + first + i)).collect()
+                there.filter_map(|(i, _)| coded.get(starts[l] + first + i)).collect()
             });
             for (part, range) in parts.iter_mut().enumerate() {
                 rest.part(range, Some(&wanted), &self.rest, part)?;
@@ -139,9 +138,9 @@ impl Form {
             }
         }
         let ranges = ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect();
-        let cell = targets.first().map_or(0, |target| target.cell);
-        let energy = targets.iter().map(|target| f64::from(target.energy)).sum();
-        Some(CodedChunk { gaussians: targets.len(), cell, bounds: bounds.0, energy, ranges })
+        let cell = coded.first().map_or(0, |gaussian| gaussian.cell);
+        let energy = coded.iter().map(|gaussian| f64::from(gaussian.energy)).sum();
+        Some(CodedChunk { gaussians: coded.len(), cell, bounds: bounds.0, energy, ranges })
     }
 
     /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: refinements and parts that follow one that

@@ -8,18 +8,18 @@ use super::integer_model::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
 use super::neighbour_context::{AVERAGED, NeighbourContext};
 use super::streams::Stream;
 use super::values::{MAX_LOG_OPACITY, rotations};
+use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::morton;
 use crate::packed::bitstream::parameters::{LAST_CLASS, TARGETS};
-use crate::packed::encode::target::Target;
 use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
 
-/// Streams of the targets of predictions.
+/// Streams of the coded of predictions.
 const TARGET_STREAMS: [Stream; TARGETS] =
     [Stream::Scale0, Stream::Scale1, Stream::Scale2, Stream::Opacity, Stream::Dc0, Stream::Dc1, Stream::Dc2];
 const POSITION_STREAMS: [Stream; 3] = [Stream::Position0, Stream::Position1, Stream::Position2];
 /// Gaps with at least this many bits share a context.
 const GAP_CONTEXTS: u32 = 23;
-/// Places of the opacity and of the first base colour among the targets.
+/// Places of the opacity and of the first base colour among the coded.
 pub(in crate::packed) const OPACITY: usize = 3;
 pub(in crate::packed) const DC: usize = 4;
 /// Averages that are not predicted: the colour class, and the shape class above it.
@@ -29,7 +29,7 @@ const SHAPE: usize = TARGETS + 1;
 pub(in crate::packed) const MAX_LEVELS: usize = 2;
 /// Bits that codes of rotations lack where this many levels are missing.
 pub(in crate::packed) const DROPPED: [u32; MAX_LEVELS + 1] = [0, 2, 3];
-/// Values that finer levels refine: those of the targets and three moves.
+/// Values that finer levels refine: those of the coded and three moves.
 pub(in crate::packed) const REFINED: usize = TARGETS + 3;
 /// Coarse steps over fine ones at one level.
 pub(in crate::packed) const FACTOR: i32 = 3;
@@ -47,11 +47,11 @@ pub(in crate::packed) struct Group {
     pub(in crate::packed) cell: [Lanes; 3],
     pub(in crate::packed) colour: Lanes<u32>,
     pub(in crate::packed) shape: Lanes<u32>,
-    /// Values of the targets by coarse steps.
+    /// Values of the coded by coarse steps.
     pub(in crate::packed) coarse: [Lanes; TARGETS],
-    /// Steps of the targets.
+    /// Steps of the coded.
     pub(in crate::packed) steps: [Lanes; TARGETS],
-    /// Coarse steps of each value, of the targets and then of the moves, as the base has them.
+    /// Coarse steps of each value, of the coded and then of the moves, as the base has them.
     pub(in crate::packed) base: [Lanes; REFINED],
     /// The same, refined as far as it is known.
     pub(in crate::packed) counts: [Lanes; REFINED],
@@ -87,23 +87,23 @@ impl<'a> GeometrySyntax<'a> {
     }
 
     /// Codes the base of the next Gaussian of each lane in `set` to `group`, which holds another or is new. Returns `None`
-    /// for impossible values, which only damaged files hold. Decoders pass no targets.
+    /// for impossible values, which only damaged files hold. Decoders pass no coded.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(in crate::packed) fn base<S: Symbols>(
         &mut self,
         s: &mut S,
         set: u32,
-        targets: Option<&[&Target; LANES]>,
+        coded: Option<&[&CodedGaussian; LANES]>,
         group: &mut Group,
     ) -> Option<()> {
         let p = self.steering;
-        let target = |l: usize| targets.map(|targets| targets[l]);
+        let gaussian = |l: usize| coded.map(|coded| coded[l]);
         let context = each(|l| self.gap_bits[l].min(GAP_CONTEXTS));
         let before = self.cell;
         let slot = |stream: Stream| stream.at(self.levels);
         let gap = s.wide(slot(Stream::Cell), context, set, |l| {
-            target(l).map_or(0, |t| t.cell.wrapping_sub(before[l]))
+            gaussian(l).map_or(0, |t| t.cell.wrapping_sub(before[l]))
         });
         let mut cell = [[0; LANES]; 3];
         let mut beyond = 0;
@@ -125,7 +125,7 @@ impl<'a> GeometrySyntax<'a> {
         } else {
             std::array::from_fn(|k| [p.means.get(k).copied().unwrap_or(0); LANES])
         };
-        let [colour, shape] = classes(s, set, targets, known, &around, self.levels)?;
+        let [colour, shape] = classes(s, set, coded, known, &around, self.levels)?;
 
         let features_of = |class: &Lanes<u32>| each(|l| (class[l] << FEATURE_BITS).cast_signed());
         let zeros = [0; LANES];
@@ -140,9 +140,9 @@ impl<'a> GeometrySyntax<'a> {
             features[0] = around[t];
             let (class, step) = if t < DC { (&shape, p.step(t, &shape)) } else { (&colour, colour_step) };
             let predicted = p.predict(t, &features);
-            if targets.is_some() {
+            if coded.is_some() {
                 for l in (0..LANES).filter(|&l| has(set, l)) {
-                    let wanted = target(l).map_or(0, |target| target.values[t]);
+                    let wanted = gaussian(l).map_or(0, |gaussian| gaussian.values[t]);
                     let steps =
                         |value: i32| (f64::from(value) - f64::from(predicted[l])) / f64::from(step[l]);
                     // What is opaque stays so: values above the largest count as that.
@@ -168,7 +168,7 @@ impl<'a> GeometrySyntax<'a> {
             group.base[t] = counts;
         }
         let scales = [features[3], features[4], features[5]];
-        self.turns_and_moves(s, set, targets, scales, group);
+        self.turns_and_moves(s, set, coded, scales, group);
         group.counts = group.base;
         remembered[COLOUR] = features[1];
         for l in 0..LANES {
@@ -185,7 +185,7 @@ impl<'a> GeometrySyntax<'a> {
         &self,
         s: &mut S,
         set: u32,
-        targets: Option<&[&Target; LANES]>,
+        coded: Option<&[&CodedGaussian; LANES]>,
         scales: [Lanes; 3],
         group: &mut Group,
     ) {
@@ -195,10 +195,10 @@ impl<'a> GeometrySyntax<'a> {
         let [directions, turns] = &group.axis_bits;
         let left = [each(|l| dropped(directions[l], self.levels)), each(|l| dropped(turns[l], self.levels))];
         group.moves = p.move_logs(&group.shape, &scales);
-        if let Some(targets) = targets {
+        if let Some(coded) = coded {
             for l in (0..LANES).filter(|&l| has(set, l)) {
                 let bits = group.axis_bits.map(|bits| bits[l]);
-                let codes = targets[l].rotation_codes(bits, group.needle[l]);
+                let codes = coded[l].rotation_codes(bits, group.needle[l]);
                 for (wanted, code) in group.wanted_rotation.iter_mut().zip(codes) {
                     wanted[l] = code;
                 }
@@ -206,7 +206,7 @@ impl<'a> GeometrySyntax<'a> {
             let axes = rotations(&group.wanted_rotation, &group.axis_bits, &group.needle).axes;
             for l in (0..LANES).filter(|&l| has(set, l)) {
                 for k in 0..3 {
-                    let along: f64 = (0..3).map(|j| f64::from(axes[k][j][l]) * targets[l].offset[j]).sum();
+                    let along: f64 = (0..3).map(|j| f64::from(axes[k][j][l]) * coded[l].offset[j]).sum();
                     let step = libm::exp2(f64::from(group.moves[k][l]) / f64::from(ONE));
                     group.wanted[TARGETS + k][l] = nearest(along / step);
                 }
@@ -241,14 +241,14 @@ pub(in crate::packed) fn dropped(bits: u32, levels: usize) -> u32 {
 fn classes<S: Symbols>(
     s: &mut S,
     set: u32,
-    targets: Option<&[&Target; LANES]>,
+    coded: Option<&[&CodedGaussian; LANES]>,
     known: bool,
     around: &[Lanes; AVERAGED],
     levels: usize,
 ) -> Option<[Lanes<u32>; 2]> {
     const LAST: i32 = LAST_CLASS as i32;
     let level = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
-    let class = |k: usize, l: usize| targets.map_or(0, |targets| u32::from(targets[l].classes[k]));
+    let class = |k: usize, l: usize| coded.map_or(0, |coded| u32::from(coded[l].classes[k]));
     let none = [0; LANES];
     let context = if known { each(|l| 1 + level(around[COLOUR][l])) } else { none };
     let colour = s.symbols(Stream::ColourClass.at(levels), context, set, |l| class(0, l));

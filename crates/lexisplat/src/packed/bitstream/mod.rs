@@ -15,6 +15,7 @@ pub(in crate::packed) mod axes;
 pub(in crate::packed) mod bits;
 pub(in crate::packed) mod bytes;
 pub(in crate::packed) mod chunk;
+pub(in crate::packed) mod coded_gaussian;
 pub(in crate::packed) mod fill_in;
 pub(in crate::packed) mod geometry_syntax;
 pub(in crate::packed) mod halves;

@@ -1,7 +1,7 @@
 //! SH-rest: the nonzeros of codes, in parts by their size, and exact rows.
 
 use super::streams::{REST_PARTS, Stream};
-use crate::packed::encode::target::Target;
+use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
 
 /// Colour classes that numbers of nonzeros are told apart by.
@@ -159,14 +159,14 @@ impl Rest {
         self.parts.iter().map(|part| part.totals[l] as usize).sum()
     }
 
-    /// Codes one part of the nonzeros of the block. `targets` holds the Gaussians of each lane. Returns `None` for
+    /// Codes one part of the nonzeros of the block. `coded` holds the Gaussians of each lane. Returns `None` for
     /// impossible values.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(in crate::packed) fn part<S: Symbols>(
         &mut self,
         s: &mut S,
-        targets: Option<&Lanes<Vec<&Target>>>,
+        coded: Option<&Lanes<Vec<&CodedGaussian>>>,
         form: &RestForm,
         part: usize,
     ) -> Option<()> {
@@ -175,13 +175,13 @@ impl Rest {
             part.checked_sub(1).and_then(|before| form.least.get(before)).map_or(MAX_SIZE, |&most| most);
         // Of each lane the nonzeros that belong to this part.
         let mut wanted: Lanes<Vec<(u16, i32)>> = Lanes::default();
-        if let Some(targets) = targets {
-            for (wanted, lane) in wanted.iter_mut().zip(targets) {
-                let all = lane.iter().flat_map(|target| &target.code);
+        if let Some(coded) = coded {
+            for (wanted, lane) in wanted.iter_mut().zip(coded) {
+                let all = lane.iter().flat_map(|gaussian| &gaussian.code);
                 wanted.extend(all.filter(|(_, value)| (least..most).contains(&value.unsigned_abs())));
             }
         }
-        self.counts(s, targets, form, part, least..most)?;
+        self.counts(s, coded, form, part, least..most)?;
         let totals = self.totals(form, part);
         self.parts[part].totals = totals;
         let count = totals.iter().copied().max().unwrap_or(0) as usize;
@@ -231,7 +231,7 @@ impl Rest {
                 }
             }
         }
-        if part == 0 { self.exact(s, targets, form) } else { Some(()) }
+        if part == 0 { self.exact(s, coded, form) } else { Some(()) }
     }
 
     /// Codes the numbers of nonzeros.
@@ -240,7 +240,7 @@ impl Rest {
     fn counts<S: Symbols>(
         &mut self,
         s: &mut S,
-        targets: Option<&Lanes<Vec<&Target>>>,
+        coded: Option<&Lanes<Vec<&CodedGaussian>>>,
         form: &RestForm,
         part: usize,
         sizes: std::ops::Range<u32>,
@@ -264,11 +264,11 @@ impl Rest {
                 })
             };
             let counts = s.integers(Stream::COUNTS[part].at(0), context, set, |l| {
-                let Some(target) = targets.and_then(|targets| targets[l].get(i)) else { return 0 };
-                if part == 0 && !target.exact.is_empty() {
+                let Some(gaussian) = coded.and_then(|coded| coded[l].get(i)) else { return 0 };
+                if part == 0 && !gaussian.exact.is_empty() {
                     return escape;
                 }
-                target.code.iter().filter(|(_, value)| sizes.contains(&value.unsigned_abs())).count() as u32
+                gaussian.code.iter().filter(|(_, value)| sizes.contains(&value.unsigned_abs())).count() as u32
             });
             for l in 0..LANES {
                 beyond |= counts[l] > escape || (counts[l] == escape && part > 0);
@@ -311,7 +311,7 @@ impl Rest {
     fn exact<S: Symbols>(
         &mut self,
         s: &mut S,
-        targets: Option<&Lanes<Vec<&Target>>>,
+        coded: Option<&Lanes<Vec<&CodedGaussian>>>,
         form: &RestForm,
     ) -> Option<()> {
         let escape = form.dim as u32 + 1;
@@ -320,8 +320,8 @@ impl Rest {
             for l in (0..LANES).filter(|&l| self.parts[0].counts[i][l] == escape) {
                 for k in 0..form.dim {
                     let own = |_: usize| {
-                        let target = targets.and_then(|targets| targets[l].get(i));
-                        target.and_then(|target| target.exact.get(k)).map_or(0, |v| v.to_bits())
+                        let gaussian = coded.and_then(|coded| coded[l].get(i));
+                        gaussian.and_then(|gaussian| gaussian.exact.get(k)).map_or(0, |v| v.to_bits())
                     };
                     let value = f32::from_bits(s.bits(Stream::Value0.at(0), [32; LANES], 1 << l, own)[l]);
                     finite &= value.is_finite();

@@ -4,9 +4,9 @@
 //! their colours too.
 
 use super::appearance::AppearanceChange;
-use super::canonical::MortonKey;
 use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::bitstream::{CHANGES, KINDS};
+use crate::packed::curve::MortonKey;
 use crate::scene::splats::Geometry;
 use crate::support::maths::log_sigmoid;
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};

@@ -1,11 +1,11 @@
-//! The canonical form of a scene: one of the 24 descriptions of each ellipsoid, in the order of cells.
+//! The canonical form of a scene: one of the 24 descriptions of each ellipsoid, and what is coded of it.
 
-use serde::{Deserialize, Serialize};
-
-use crate::packed::bitstream::morton;
-use crate::scene::offset::{Offset, shift};
+use crate::packed::bitstream::coded_gaussian::CodedGaussian;
+use crate::packed::bitstream::fill_in::CHANGES;
+use crate::packed::bitstream::integer_model::VALUE_BITS;
+use crate::packed::bitstream::parameters::Parameters;
 use crate::scene::splats::Geometry;
-use crate::support::maths::{Vec3, at_share, columns, cross, dot, log_sigmoid, longest_first};
+use crate::support::maths::{Vec3, columns, cross, dot, log_sigmoid, longest_first};
 
 /// Largest logarithm of the ratio of the longest axis to the thinnest. Thinner ellipsoids look the same, since
 /// pictures blur by 0.3 squared pixels.
@@ -17,10 +17,10 @@ const MAX_LOG_SCALE: f32 = 40.0;
 const MAX_DRAWN_LOG_SCALE: f32 = 44.361_42;
 /// Smallest logarithm of an opacity. The exponential of a smaller one is about 0 in f32.
 pub(in crate::packed) const MIN_LOG_OPACITY: f32 = -100.0;
-/// Cells along the longest side of the bulk, for each Gaussian in it.
-const CELLS_PER_GAUSSIAN: f64 = 3000.0;
-/// Share of the Gaussians at either end of each axis that are not part of the bulk.
-const TRIM: f64 = 0.01;
+/// Smallest logarithm of an opacity, of 2^-23. No picture shows less.
+const LEAST_LOG_OPACITY: f32 = -16.0;
+/// Largest absolute value.
+const MOST_VALUE: f64 = (1_u32 << 26) as f64;
 
 /// One Gaussian in canonical form.
 #[derive(Debug, Clone, Copy, Default)]
@@ -35,106 +35,6 @@ pub(in crate::packed) struct Canonical {
     /// Natural logarithm of the opacity after the sigmoid.
     pub(in crate::packed) log_opacity: f32,
     pub(in crate::packed) dc: Vec3,
-}
-
-/// A Gaussian's place in a packed scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub(crate) struct MortonKey {
-    pub(crate) cell: u64,
-    /// Its index in the scene.
-    pub(crate) source: u32,
-}
-
-impl MortonKey {
-    pub(in crate::packed) fn index(self) -> usize {
-        self.source as usize
-    }
-}
-
-/// Smallest and largest coordinates; 0 if there are no positions.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Bounds {
-    least: Vec3,
-    most: Vec3,
-}
-
-impl Bounds {
-    pub(crate) fn of(positions: &[Vec3]) -> Self {
-        let mut positions = positions.iter();
-        let Some(&first) = positions.next() else { return Self { least: [0.0; 3], most: [0.0; 3] } };
-        let mut bounds = Self { least: first, most: first };
-        positions.for_each(|&p| bounds.add(Self { least: p, most: p }));
-        bounds
-    }
-
-    /// The bounds of the same positions relative to another offset.
-    pub(in crate::packed) fn rebased(mut self, from: Option<Offset>, to: Option<Offset>) -> Self {
-        // Moving and rounding keep the order of numbers.
-        shift(std::slice::from_mut(&mut self.least), from, to);
-        shift(std::slice::from_mut(&mut self.most), from, to);
-        self
-    }
-
-    /// Includes `other`.
-    pub(crate) fn add(&mut self, other: Self) {
-        for k in 0..3 {
-            // The corner of the grid has always been found by `total_cmp`, which orders -0 before 0.
-            self.least[k] = std::cmp::min_by(self.least[k], other.least[k], f32::total_cmp);
-            self.most[k] = std::cmp::max_by(self.most[k], other.most[k], f32::total_cmp);
-        }
-    }
-}
-
-/// The grid of cells.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Grid {
-    pub(in crate::packed) origin: Vec3,
-    pub(in crate::packed) cell: f32,
-}
-
-impl Grid {
-    /// A grid over all positions. Its cells hold about one Gaussian where most Gaussians are.
-    pub(in crate::packed) fn fit(positions: &[Vec3]) -> Self {
-        Self::fit_sample(positions, Bounds::of(positions), positions.len())
-    }
-
-    /// [`Self::fit`] for `total` positions within `bounds`, from a sample of them.
-    pub(crate) fn fit_sample(sample: &[Vec3], bounds: Bounds, total: usize) -> Self {
-        let mut bulk = 0.0_f64;
-        for k in 0..3 {
-            let mut values: Vec<f32> = sample.iter().map(|p| p[k]).collect();
-            values.sort_by(f32::total_cmp);
-            let at = |share| f64::from(at_share(&values, share));
-            bulk = bulk.max(at(1.0 - TRIM) - at(TRIM));
-        }
-        let Bounds { least: origin, most } = bounds;
-        let whole = (0..3).map(|k| f64::from(most[k]) - f64::from(origin[k])).fold(0.0, f64::max);
-        let wanted = bulk / libm::cbrt(CELLS_PER_GAUSSIAN * total.max(1) as f64);
-        // All coordinates must fit, and cells must not be empty.
-        let least = whole / f64::from((1_u32 << morton::BITS) - 2);
-        let cell = wanted.max(least).max(whole * 1e-6).max(1e-9);
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-        let cell = (cell * (1.0 + 1e-6)) as f32;
-        Self { origin, cell }
-    }
-
-    /// Number of the cell of `position` on the Morton curve.
-    pub(crate) fn cell(&self, position: Vec3) -> u64 {
-        let most = f64::from((1_u32 << morton::BITS) - 1);
-        morton::encode(std::array::from_fn(|k| {
-            let at = (f64::from(position[k]) - f64::from(self.origin[k])) / f64::from(self.cell);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-            let at = at.floor().clamp(0.0, most) as u32;
-            at
-        }))
-    }
-
-    /// The places of all Gaussians, in the order of `geometry`.
-    pub(in crate::packed) fn keys(&self, geometry: &Geometry) -> Vec<MortonKey> {
-        // Scenes have at most 2^32 - 2 Gaussians.
-        let key = |(source, &position)| MortonKey { cell: self.cell(position), source };
-        (0_u32..).zip(&geometry.positions).map(key).collect()
-    }
 }
 
 /// Gaussian `i` in canonical form.
@@ -155,5 +55,39 @@ pub(in crate::packed) fn canonical(geometry: &Geometry, i: usize) -> Canonical {
         position: geometry.positions[i],
         log_opacity: log_opacity.max(MIN_LOG_OPACITY),
         dc: geometry.dc[i],
+    }
+}
+
+/// `x` as a value.
+fn value(x: f64) -> i32 {
+    #[expect(clippy::cast_possible_truncation, reason = "clamped")]
+    let value = libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(-MOST_VALUE, MOST_VALUE) as i32;
+    value
+}
+
+impl Canonical {
+    /// Returns all that is coded of it but its SH-rest. `dc_unit` is the unit of base colours.
+    pub(in crate::packed) fn coded(
+        &self,
+        cell: u64,
+        centre: [f64; 3],
+        classes: [u8; 2],
+        parameters: &Parameters,
+        dc_unit: f64,
+    ) -> CodedGaussian {
+        let [s0, s1, s2] = self.scales.map(|s| value(f64::from(s)));
+        let opacity = value(f64::from(self.log_opacity.max(LEAST_LOG_OPACITY)));
+        let [d0, d1, d2] = parameters.dc_coordinates(self.dc).map(|d| value(f64::from(d) / dc_unit));
+        CodedGaussian {
+            cell,
+            classes,
+            values: [s0, s1, s2, opacity, d0, d1, d2],
+            axes: self.axes,
+            offset: std::array::from_fn(|k| f64::from(self.position[k]) - centre[k]),
+            code: Vec::new(),
+            energy: 0.0,
+            interim: [0; CHANGES],
+            exact: Vec::new(),
+        }
     }
 }

@@ -3,13 +3,14 @@
 use half::f16;
 
 use super::appearance::{Appearance, AppearanceChange};
-use super::canonical::{MortonKey, canonical};
+use super::canonical::canonical;
 use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_atoms, learn};
 use super::pack::PackOptions;
+use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::morton;
 use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::bitstream::{MeanView, WholeAtoms, seen_row};
-use crate::packed::encode::target::Target;
+use crate::packed::curve::MortonKey;
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::Splats;
 use crate::sparse::codes::reconstruct;
@@ -167,7 +168,7 @@ impl ChunkCoder {
         view: OrderedGaussians<'_>,
         codes: &Codes,
         dc_unit: f64,
-    ) -> Result<(Tally, Vec<Target>)> {
+    ) -> Result<(Tally, Vec<CodedGaussian>)> {
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let dim = dictionary.dim();
         let mut tally = Tally::new(dim);
@@ -207,7 +208,7 @@ impl ChunkCoder {
                 }
             }
             form.dc = std::array::from_fn(|c| form.dc[c] + shown[c]);
-            let mut target = Target::new(&form, placed.cell, centre, classes, parameters, dc_unit);
+            let mut target = form.coded(placed.cell, centre, classes, parameters, dc_unit);
             (target.code, target.exact) = (code, exact);
             targets.push(target);
         }

@@ -2,11 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::canonical::{Canonical, Grid, MortonKey, canonical};
+use super::canonical::{Canonical, canonical};
 use super::neighbours::Neighbours;
 use super::octaves::Histogram;
 use crate::packed::bitstream::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
 use crate::packed::bitstream::rounded_axes;
+use crate::packed::curve::{Grid, MortonKey};
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::sh::C0;
 use crate::scene::splats::Geometry;

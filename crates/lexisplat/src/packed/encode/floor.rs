@@ -5,9 +5,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::canonical::{MortonKey, canonical};
+use super::canonical::canonical;
 use super::fit::rounded;
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, least_axis, rotation_steps};
+use crate::packed::curve::MortonKey;
 use crate::scene::sh::C0;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{exp, exp2, log2};

@@ -4,7 +4,6 @@ use std::borrow::Borrow;
 
 use serde::{Deserialize, Serialize};
 
-use super::canonical::{Grid, MortonKey};
 use super::fit::Fit;
 use super::floor::Floor;
 use super::layering::LEAST_LAYERED;
@@ -12,6 +11,7 @@ use super::quantised::{Fitted, Gaussians, Quantised};
 use super::removal::Weights;
 use crate::packed::bitstream::MeanView;
 use crate::packed::bitstream::parameters::Parameters;
+use crate::packed::curve::{Grid, MortonKey};
 use crate::packed::scene::Packed;
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::{Splats, all_finite};

@@ -4,16 +4,16 @@ use std::ops::Range;
 
 use super::alone::Alone;
 use super::appearance::{Appearance, AppearanceChange};
-use super::canonical::MortonKey;
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, OrderedGaussians, too_large};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written};
 use super::layering::Layering;
 use super::pack::PackOptions;
+use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::bitstream::{CodedChunk, MeanView};
+use crate::packed::curve::MortonKey;
 use crate::packed::decode::reorder::gather;
-use crate::packed::encode::target::Target;
 use crate::packed::entropy::tables::Tables;
 use crate::packed::scene::Packed;
 use crate::scene::extra::{Extra, for_extra};
@@ -254,7 +254,7 @@ impl<'a> Quantised<'a> {
         &self,
         view: OrderedGaussians<'_>,
         progress: &dyn Progress,
-        with: impl Fn(usize, Tally, Vec<Target>) -> Result<T> + Sync,
+        with: impl Fn(usize, Tally, Vec<CodedGaussian>) -> Result<T> + Sync,
     ) -> Vec<Result<T>> {
         let coder = &self.encoding.coder;
         let unit = self.encoding.head.dc_unit();

@@ -1,6 +1,6 @@
 //! Which Gaussians a packed file leaves out.
 
-use super::canonical::MortonKey;
+use crate::packed::curve::MortonKey;
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::Geometry;
 use crate::support::maths::log_sigmoid;

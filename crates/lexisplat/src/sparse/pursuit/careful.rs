@@ -7,9 +7,10 @@
 //!
 //! Rows are scaled by a power of two to values below 1, so rows of any size have the same codes but for that factor.
 
-use super::engine::{Coder, ValueType};
-use super::value::RowValue;
+use super::ValueType;
+use super::engine::Coder;
 use crate::sparse::model::Pursuit;
+use crate::sparse::row_value::RowValue;
 
 /// An atom whose squared distance to the chosen span is below this counts as part of the span. Two atoms that differ at all
 /// in f32 are farther apart.

@@ -1,10 +1,11 @@
-//! Codes many vectors: the stopping rule, the value type, and the check that every error is within the tolerance.
+//! Codes many vectors: the stopping rule, and the check that every error is within the tolerance.
 
 use half::f16;
 
 use super::greedy::{ANY, Plan, Scratch, squared_distance};
 use super::lanes::blocks_of;
 use crate::sparse::atoms::Atoms;
+use crate::sparse::codes::ValueType;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
 use crate::support::error::{Error, Result};
@@ -22,15 +23,6 @@ const NOISE_FLOOR: f64 = 1e-12;
 
 /// Lanes of a per-atom array of the paper's dictionary, 90 atoms. Loops of a length known to the compiler are faster.
 const DEFAULT_BLOCKS: usize = blocks_of(90);
-
-/// Precision of the stored values. The error is verified after the values are rounded to it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ValueType {
-    /// 32-bit float.
-    F32,
-    /// 16-bit float.
-    F16,
-}
 
 /// When a pursuit ends: at a tolerance or at a number of atoms, whichever comes first.
 #[derive(Debug, Clone, Copy, PartialEq)]

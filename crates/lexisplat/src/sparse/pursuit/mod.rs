@@ -20,12 +20,12 @@ pub(crate) mod lanes;
 mod rows;
 #[cfg(test)]
 pub(super) mod tests;
-mod value;
 
-pub use engine::{Coder, Encoded, StopRule, ValueType, Visit};
+pub use super::codes::ValueType;
+pub use super::row_value::RowValue;
+pub use engine::{Coder, Encoded, StopRule, Visit};
 pub(crate) use rows::RowCoder;
 pub use rows::{RowCodes, encode_rows};
-pub use value::RowValue;
 
 /// Rows that one task codes: few enough that even small sets of long rows occupy all threads.
 pub(crate) const ROWS_PER_TASK: usize = 256;

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use super::careful::{Careful, Work};
 use super::engine::MIN_ENERGY;
-use super::value::RowValue;
 use super::{Coder, Encoded, ROWS_PER_TASK, Visit};
 use crate::sparse::atoms::{check_finite, count_rows};
+use crate::sparse::row_value::RowValue;
 use crate::support::error::Result;
 use crate::support::parallel::map_chunks;
 use crate::support::progress::{Progress, Stage};

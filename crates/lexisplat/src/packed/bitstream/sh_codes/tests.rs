@@ -9,7 +9,7 @@ use crate::packed::entropy::script::tables_of;
 use crate::packed::entropy::tables::{Lookup, Tables};
 
 /// The Gaussians of each lane, none more than the first lane has.
-type Scene = Lanes<Vec<Target>>;
+type Scene = Lanes<Vec<CodedGaussian>>;
 
 fn forms() -> impl Strategy<Value = RestForm> {
     let least = prop_oneof![Just(vec![1]), Just(vec![6, 1]), Just(vec![12, 6, 1])];
@@ -22,7 +22,7 @@ fn forms() -> impl Strategy<Value = RestForm> {
 }
 
 /// Codes of up to `dim` nonzeros, some exact rows.
-fn target(form: &RestForm) -> impl Strategy<Value = Target> + use<> {
+fn target(form: &RestForm) -> impl Strategy<Value = CodedGaussian> + use<> {
     let size = prop_oneof![6 => 1..20_u32, 1 => 1..MAX_SIZE, 1 => Just(MAX_SIZE - 1)];
     let value = (size, any::<bool>())
         .prop_map(|(size, negative)| if negative { -size.cast_signed() } else { size.cast_signed() });
@@ -34,7 +34,7 @@ fn target(form: &RestForm) -> impl Strategy<Value = Target> + use<> {
     let parts = (count, pairs, exact, prop::array::uniform2(0_u8..16));
     parts.prop_map(|(count, mut code, exact, classes)| {
         code.truncate(if exact.is_some() { 0 } else { count });
-        let mut target = Target::default();
+        let mut target = CodedGaussian::default();
         (target.classes, target.code, target.exact) = (classes, code, exact.unwrap_or_default());
         target
     })
@@ -77,7 +77,7 @@ fn code<S: Symbols>(
             rest.push(set(scene, i), colours);
         }
         let of = |l: usize| scene[l].iter().skip(first).take(block.len()).collect();
-        let wanted: Lanes<Vec<&Target>> = std::array::from_fn(of);
+        let wanted: Lanes<Vec<&CodedGaussian>> = std::array::from_fn(of);
         for (part, s) in parts.iter_mut().enumerate() {
             rest.part(s, encoder.then_some(&wanted), form, part)?;
         }
@@ -174,7 +174,7 @@ fn rows_that_are_not_finite_are_refused() {
         let mut scene = Scene::default();
         let mut exact = vec![1.0; 9];
         exact[8] = wild;
-        let mut target = Target::default();
+        let mut target = CodedGaussian::default();
         target.exact = exact;
         scene[0].push(target);
         let mut parts = vec![SymbolRecorder::default(); 2];

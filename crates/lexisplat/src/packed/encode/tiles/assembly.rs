@@ -105,7 +105,7 @@ impl<'a> Assembly<'a> {
         let mut encoding = coding.encoding(plan)?;
         encoding.counts.add(&all.ok_or_else(missing)?.counts);
         let gaussians: usize = layers.iter().map(|layer| layer.gaussians).sum();
-        let meta = plan.like.meta.clone();
+        let meta = plan.kind.meta.clone();
         let Finished { mut head, data, report } =
             encoding.assemble(gaussians, &plan.options, meta, &tables.read(plan)?, ranges)?;
         head.device = device;

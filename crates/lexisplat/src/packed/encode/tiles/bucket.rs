@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::look::{LookStatistics, Looked, SHOWN};
 use super::plan::{Piece, Plan};
+use crate::packed::curve::MortonKey;
 use crate::packed::decode::reorder::{gather, gather_geometry};
-use crate::packed::encode::canonical::MortonKey;
 use crate::packed::encode::pack::check;
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;

@@ -9,7 +9,7 @@ use super::plan::Plan;
 use super::sample::SampleStatistics;
 use super::steps::Steps;
 use crate::packed::bitstream::{MeanView, WholeAtoms};
-use crate::packed::encode::canonical::MortonKey;
+use crate::packed::curve::MortonKey;
 use crate::packed::encode::codebook::{Choice, Costs};
 use crate::packed::encode::coder::{ChunkCoder, Learning, VALUES, too_large};
 use crate::packed::encode::encoding::{self, Encoding, Written};
@@ -98,7 +98,7 @@ impl Coding {
             return Err(too_large());
         }
         let (rows, classes) = all.shuffled(plan);
-        let (degree, stop) = (plan.like.degree, steps.stop);
+        let (degree, stop) = (plan.kind.degree, steps.stop);
         let learning = Learning { degree, total: steps.kept(), stop, options: &plan.options };
         let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
         let most_dc = f64::from(all.dc.quantile(USUAL_DC));
@@ -258,7 +258,7 @@ impl Coded {
         let belongs = |(number, layer): (usize, &CodedLayer)| {
             layer.gaussians == gaussians(number)
                 && layer.order.as_ref().map(Vec::len) == plan.options.keep_order.then_some(layer.gaussians)
-                && layer.extras.len() == plan.like.extras.len()
+                && layer.extras.len() == plan.kind.extras.len()
         };
         if self.layers.len() != layers || !self.layers.iter().enumerate().all(belongs) {
             return Err(Error::parameter("coded bucket", self.bucket, "layers that hold its chunks"));

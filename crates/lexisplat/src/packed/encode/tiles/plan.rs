@@ -6,14 +6,15 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::message::messages;
-use super::survey::{BLOCK, Like, Survey};
+use super::survey::{BLOCK, Survey};
 use super::{BUCKET, message};
-use crate::packed::encode::canonical::{Bounds, Grid, MortonKey};
+use crate::packed::curve::{Bounds, Grid, MortonKey};
 use crate::packed::encode::pack::{PackOptions, expected_step};
 use crate::scene::extra::{Extra, ExtraValues};
 use crate::scene::offset::{Offset, shift};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{Geometry, Splats};
+use crate::scene::tile_kind::TileKind;
 use crate::stream::{RowLayout, each_part};
 use crate::support::crc32;
 use crate::support::error::{Error, Result};
@@ -42,7 +43,7 @@ pub struct Plan {
     pub(super) grid: Grid,
     /// Sum of the expected weights of all Gaussians.
     pub(super) guessed_total: f64,
-    pub(super) like: Like,
+    pub(super) kind: TileKind,
     /// Where buckets end but the last: of all tiles, or of each on its own.
     ends: Vec<Vec<MortonKey>>,
 }
@@ -73,7 +74,7 @@ impl Plan {
         bucket: usize,
     ) -> Result<Self> {
         options.check()?;
-        let mut like: Option<Like> = None;
+        let mut kind: Option<TileKind> = None;
         let offset = shared_offset(tiles);
         let mut firsts = vec![0_u64];
         let mut bounds: Option<Bounds> = None;
@@ -84,10 +85,10 @@ impl Plan {
             let Some(first) = blocks.first() else {
                 return Err(Error::malformed(name, "the tile has no Gaussians"));
             };
-            first.like.check(name, like.as_ref(), first.gaussians)?;
-            like.get_or_insert_with(|| first.like.clone()).meta.join(&first.like.meta);
+            first.kind.check(name, kind.as_ref(), first.gaussians)?;
+            kind.get_or_insert_with(|| first.kind.clone()).meta.join(&first.kind.meta);
             for block in blocks {
-                let from = first.like.meta.offset;
+                let from = first.kind.meta.offset;
                 for &(row, mut position) in &block.positions {
                     shift(std::slice::from_mut(&mut position), from, offset);
                     looked.push((number, position, total + u64::from(row)));
@@ -100,8 +101,8 @@ impl Plan {
             }
             firsts.push(total);
         }
-        let Some(mut like) = like else { return Err(Error::parameter("tiles", 0, "at least one")) };
-        like.meta.offset = offset;
+        let Some(mut kind) = kind else { return Err(Error::parameter("tiles", 0, "at least one")) };
+        kind.meta.offset = offset;
         Limits::check("Gaussians", total, MAX_GAUSSIANS)?;
         let gaussians = usize::try_from(total).unwrap_or(usize::MAX);
         let positions: Vec<Vec3> = looked.iter().map(|l| l.1).collect();
@@ -124,7 +125,7 @@ impl Plan {
         let ends = (0..count).map(ends_of).collect();
         let step = expected_step(gaussians, decibels);
         let mut plan =
-            Self { scene: 0, options: options.clone(), step, firsts, grid, guessed_total, like, ends };
+            Self { scene: 0, options: options.clone(), step, firsts, grid, guessed_total, kind, ends };
         // With its own checksum at the end, the checksum of any message is the same.
         let bytes = plan.to_bytes();
         plan.scene = crc32::hash(bytes.split_last_chunk::<{ message::CHECKSUM }>().map_or(&[], |b| b.0));
@@ -306,12 +307,12 @@ impl Plan {
         }
         let mut part = tile.empty();
         let own_offset = part.meta.offset;
-        if let Some(difference) = self.like.difference(&Like::of(&part)) {
+        if let Some(difference) = self.kind.difference(&TileKind::of(&part)) {
             return Err(Error::parameter("tile", difference, "what it was when it was surveyed"));
         }
         each_part(tile, rows, &mut part, progress, &mut |start, part| {
             part.geometry.normals = Vec::new();
-            shift(&mut part.geometry.positions, own_offset, self.like.meta.offset);
+            shift(&mut part.geometry.positions, own_offset, self.kind.meta.offset);
             let number = (first + start as u64)..;
             let keys = number.zip(&part.geometry.positions);
             let keys: Vec<MortonKey> = keys.map(|(row, &p)| placed(&self.grid, p, row)).collect();
@@ -346,12 +347,12 @@ impl Plan {
     pub fn empty(&self) -> Splats {
         let extra =
             |(name, kind): &(String, _)| Extra { name: name.clone(), values: ExtraValues::none(*kind) };
-        let extras = self.like.extras.iter().map(extra).collect();
+        let extras = self.kind.extras.iter().map(extra).collect();
         Splats {
             geometry: Geometry { extras, ..Geometry::default() },
-            degree: self.like.degree,
+            degree: self.kind.degree,
             sh_rest: Vec::new(),
-            meta: self.like.meta.clone(),
+            meta: self.kind.meta.clone(),
         }
     }
 }
@@ -397,7 +398,7 @@ impl Piece {
 fn shared_offset(tiles: &[(String, Vec<Survey>)]) -> Option<Offset> {
     let of = |blocks: &Vec<Survey>| {
         let gaussians = blocks.iter().map(|block| block.gaussians).fold(0, u64::saturating_add);
-        Some((blocks.first()?.like.meta.offset, gaussians))
+        Some((blocks.first()?.kind.meta.offset, gaussians))
     };
     let offsets: Vec<_> = tiles.iter().filter_map(|(_, blocks)| of(blocks)).collect();
     Offset::shared(&offsets)

@@ -9,7 +9,7 @@ use super::message::messages;
 use super::plan::Plan;
 use super::steps::Steps;
 use crate::packed::bitstream::MeanView;
-use crate::packed::encode::canonical::MortonKey;
+use crate::packed::curve::MortonKey;
 use crate::packed::encode::coder::{OrderedGaussians, SAMPLE, SAMPLE_STREAM};
 use crate::packed::encode::fit::Predictors;
 use crate::packed::encode::octaves::Histogram;
@@ -175,7 +175,7 @@ impl SampleStatistics {
             out.rows.extend_from_slice(&group.rows);
             out.classes.extend_from_slice(&group.classes);
         }
-        let expected = out.classes.len() * plan.like.degree.rest() * size_of::<f16>();
+        let expected = out.classes.len() * plan.kind.degree.rest() * size_of::<f16>();
         if out.rows.len() != expected {
             return Err(Error::parameter(
                 "sample statistics",
@@ -188,7 +188,7 @@ impl SampleStatistics {
 
     /// The rows in random order, and their classes.
     pub(super) fn shuffled(&self, plan: &Plan) -> (Vec<f32>, Vec<u8>) {
-        let bytes = plan.like.degree.rest() * size_of::<f16>();
+        let bytes = plan.kind.degree.rest() * size_of::<f16>();
         let (mut rows, mut classes) = (Vec::new(), Vec::new());
         for i in SplitMix64::new(plan.options.seed ^ SAMPLE_STREAM).shuffled(self.classes.len()) {
             let row = self.rows[i * bytes..(i + 1) * bytes].chunks_exact(size_of::<f16>());

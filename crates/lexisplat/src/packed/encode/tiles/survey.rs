@@ -5,14 +5,12 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::message::messages;
-use crate::packed::encode::canonical::Bounds;
-use crate::scene::extra::ScalarType;
+use crate::packed::curve::Bounds;
 use crate::scene::sensitivity::guessed_total;
-use crate::scene::sh::ShDegree;
 use crate::scene::source::SplatSource;
-use crate::scene::splats::{SceneMeta, Splats};
+use crate::scene::tile_kind::TileKind;
 use crate::stream::each_part;
-use crate::support::error::{Error, Result};
+use crate::support::error::Result;
 use crate::support::maths::Vec3;
 use crate::support::progress::Progress;
 use crate::support::rng::SplitMix64;
@@ -33,60 +31,9 @@ pub struct Survey {
     pub(super) guessed_total: f64,
     /// Rows of the block and their positions, one of every [`STRIDE`] rows.
     pub(super) positions: Vec<(u32, Vec3)>,
-    pub(super) like: Like,
+    pub(super) kind: TileKind,
 }
 messages!(Survey => "survey");
-
-/// What all tiles of a scene have in common.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Like {
-    pub(super) degree: ShDegree,
-    pub(super) meta: SceneMeta,
-    pub(super) extras: Vec<(String, ScalarType)>,
-}
-
-impl Like {
-    pub(super) fn of(empty: &Splats) -> Self {
-        let extras = &empty.geometry.extras;
-        Self {
-            degree: empty.degree,
-            meta: empty.meta.clone(),
-            extras: extras.iter().map(|extra| (extra.name.clone(), extra.values.scalar_type())).collect(),
-        }
-    }
-
-    /// Refuses a tile of so many Gaussians that has none or does not go together with those `before`.
-    pub(super) fn check(&self, name: &str, before: Option<&Self>, gaussians: u64) -> Result<()> {
-        let wrong = match before.and_then(|before| before.difference(self)) {
-            _ if gaussians == 0 => "no Gaussians".to_owned(),
-            Some(difference) => difference,
-            None => return Ok(()),
-        };
-        Err(Error::malformed(name, format!("the tile has {wrong}")))
-    }
-
-    /// What of `next` does not go together with this.
-    pub(super) fn difference(&self, next: &Self) -> Option<String> {
-        if self.degree != next.degree {
-            let (own, other) = (self.degree.get(), next.degree.get());
-            return Some(format!("SH degree {other}, where the tiles before have degree {own}"));
-        }
-        if self.meta.antialiased != next.meta.antialiased {
-            return Some("another antialiasing mark than the tiles before".to_owned());
-        }
-        let names = |extras: &[(String, ScalarType)]| {
-            let all = extras.iter().map(|(name, kind)| format!("{name} ({})", kind.name()));
-            if extras.is_empty() { "none".to_owned() } else { all.collect::<Vec<_>>().join(", ") }
-        };
-        (self.extras != next.extras).then(|| {
-            format!(
-                "the extra properties {}, where the tiles before have {}; leave extras out to go on",
-                names(&next.extras),
-                names(&self.extras)
-            )
-        })
-    }
-}
 
 impl Survey {
     /// Looks at `rows` of `tile`, at most [`BLOCK`] of them, which begin at a multiple of it. Reports their bytes to
@@ -106,7 +53,7 @@ impl Survey {
             bounds: None,
             guessed_total: 0.0,
             positions: Vec::with_capacity(rows.len().div_ceil(STRIDE)),
-            like: Like::of(&part),
+            kind: TileKind::of(&part),
         };
         let mut random = SplitMix64::new(seed ^ LOOK_STREAM ^ rows.start as u64);
         let chosen = rows.clone().step_by(STRIDE);
@@ -132,17 +79,7 @@ impl Survey {
     /// # Errors
     /// [`Error::Format`] that names the tile.
     pub fn check(&self, name: &str, before: Option<&Self>) -> Result<()> {
-        self.like.check(name, before.map(|before| &before.like), self.gaussians)
-    }
-
-    /// Refuses a tile that has no Gaussians or does not go together with those before, which are like `before`.
-    pub(crate) fn check_tile(
-        name: &str,
-        before: Option<&Splats>,
-        own: &Splats,
-        gaussians: usize,
-    ) -> Result<()> {
-        Like::of(own).check(name, before.map(Like::of).as_ref(), gaussians as u64)
+        self.kind.check(name, before.map(|before| &before.kind), self.gaussians)
     }
 
     /// Number of Gaussians.

@@ -1,27 +1,21 @@
-//! What the encoder is to code of a Gaussian.
+//! A Gaussian as the encoder hands it to the syntax: integers and the values that they are made of.
 
 use crate::packed::bitstream::fill_in::CHANGES;
-use crate::packed::bitstream::integer_model::VALUE_BITS;
-use crate::packed::bitstream::parameters::{Parameters, TARGETS};
-use crate::packed::bitstream::values::across;
-use crate::packed::encode::canonical::Canonical;
+use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::bitstream::values::{across, main_axis};
 use crate::support::maths::{Vec3, atan2, dot, square_of_axis};
-
-/// Smallest logarithm of an opacity, of 2^-23. No picture shows less.
-const LEAST_LOG_OPACITY: f32 = -16.0;
-/// Largest absolute value.
-const MOST_VALUE: f64 = (1_u32 << 26) as f64;
 
 /// A Gaussian to be coded.
 #[derive(Debug, Clone, Default)]
-pub(in crate::packed) struct Target {
+pub(in crate::packed) struct CodedGaussian {
     /// Number of its cell on the Morton curve. It is not below that of the Gaussian before it in its lane.
     pub(in crate::packed) cell: u64,
     /// Colour and shape class.
     pub(in crate::packed) classes: [u8; 2],
     /// Logarithms of the scales, that of the opacity, and the coordinates of the base colour, as values.
     pub(in crate::packed) values: [i32; TARGETS],
-    axes: [Vec3; 3],
+    /// Its axes, longest first, right-handed.
+    pub(in crate::packed) axes: [Vec3; 3],
     /// Position from the centre of its cell.
     pub(in crate::packed) offset: [f64; 3],
     /// Pairs (atom, value in steps) with values that are not zero, largest first.
@@ -34,39 +28,7 @@ pub(in crate::packed) struct Target {
     pub(in crate::packed) exact: Vec<f32>,
 }
 
-/// `x` as a value.
-fn value(x: f64) -> i32 {
-    #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-    let value = libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(-MOST_VALUE, MOST_VALUE) as i32;
-    value
-}
-
-impl Target {
-    /// What is coded of `form` but for its SH-rest. `dc_unit` is the unit of base colours.
-    pub(in crate::packed) fn new(
-        form: &Canonical,
-        cell: u64,
-        centre: [f64; 3],
-        classes: [u8; 2],
-        parameters: &Parameters,
-        dc_unit: f64,
-    ) -> Self {
-        let [s0, s1, s2] = form.scales.map(|s| value(f64::from(s)));
-        let opacity = value(f64::from(form.log_opacity.max(LEAST_LOG_OPACITY)));
-        let [d0, d1, d2] = parameters.dc_coordinates(form.dc).map(|d| value(f64::from(d) / dc_unit));
-        Self {
-            cell,
-            classes,
-            values: [s0, s1, s2, opacity, d0, d1, d2],
-            axes: form.axes,
-            offset: std::array::from_fn(|k| f64::from(form.position[k]) - centre[k]),
-            code: Vec::new(),
-            energy: 0.0,
-            interim: [0; CHANGES],
-            exact: Vec::new(),
-        }
-    }
-
+impl CodedGaussian {
     /// The codes of its rotation in full.
     pub(in crate::packed) fn rotation_codes(&self, [direction, turn]: [u32; 2], needle: bool) -> [u32; 3] {
         let (main, other) = if needle { (0, 1) } else { (2, 0) };
@@ -78,10 +40,7 @@ impl Target {
         };
         let middle = |code: u32, bits: u32| (code as f32 + 0.5) / (1_u32 << bits) as f32;
         let codes = square_of_axis(self.axes[main]).map(|x| cell((x + 1.0) * 0.5, direction));
-        let u = crate::packed::bitstream::values::main_axis(
-            middle(codes[0], direction),
-            middle(codes[1], direction),
-        );
+        let u = main_axis(middle(codes[0], direction), middle(codes[1], direction));
         let [first, second] = across(u);
         let angle = atan2(dot(self.axes[other], second), dot(self.axes[other], first));
         let half_turn = std::f32::consts::PI;
