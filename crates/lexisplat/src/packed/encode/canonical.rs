@@ -1,4 +1,4 @@
-//! The canonical form of a scene: one of the 24 descriptions of each ellipsoid, in the order of cells.
+//! The canonical form of a scene: each ellipsoid in one of its 24 descriptions, and the Gaussians in the order of cells.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,19 +7,20 @@ use crate::scene::offset::{Offset, shift};
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, at_share, columns, cross, dot, log_sigmoid, longest_first};
 
-/// Largest logarithm of the ratio of the longest axis to the thinnest. Thinner ellipsoids look the same, since
-/// pictures blur by 0.3 squared pixels.
+/// Largest logarithm of the ratio of the longest axis to another. Thinner ellipsoids look the same, since pictures blur by
+/// 0.3 squared pixels.
 const MAX_THINNESS: f32 = 9.0;
-/// Largest magnitude of the logarithm of a standard deviation. Beyond it exp leaves f32.
+/// Largest magnitude of the logarithm of a standard deviation. The exponential of a larger one leaves f32.
 const MAX_LOG_SCALE: f32 = 40.0;
-/// Half the logarithm of the largest f32. The variance of a larger scale leaves f32, and no rasteriser draws the
-/// Gaussian. With its scale limited to [`MAX_LOG_SCALE`] it might be drawn, so it is made invisible.
+/// Half the logarithm of the largest f32. The variance of a larger scale leaves f32, and no rasteriser draws such a
+/// Gaussian. A file limits the scale to [`MAX_LOG_SCALE`], with which the Gaussian might be drawn, so its opacity becomes
+/// the smallest one.
 const MAX_DRAWN_LOG_SCALE: f32 = 44.361_42;
 /// Smallest logarithm of an opacity. The exponential of a smaller one is about 0 in f32.
 pub(in crate::packed) const MIN_LOG_OPACITY: f32 = -100.0;
-/// Cells along the longest side of the bulk, for each Gaussian in it.
+/// Number of cells for each Gaussian, in a cube whose side is the longest side of the bulk of the scene.
 const CELLS_PER_GAUSSIAN: f64 = 3000.0;
-/// Share of the Gaussians at either end of each axis that are not part of the bulk.
+/// Share of the positions at each end of each axis that are not part of the bulk.
 const TRIM: f64 = 0.01;
 
 /// One Gaussian in canonical form.
@@ -27,9 +28,9 @@ const TRIM: f64 = 0.01;
 pub(in crate::packed) struct Canonical {
     /// Natural logarithms of the standard deviations, longest first.
     pub(in crate::packed) scales: Vec3,
-    /// The axis of the source that each is.
+    /// The axis of the source that each of `scales` belongs to.
     pub(in crate::packed) order: [usize; 3],
-    /// In that order, right-handed.
+    /// The directions of the axes in the order of `scales`, as a right-handed system.
     pub(in crate::packed) axes: [Vec3; 3],
     pub(in crate::packed) position: Vec3,
     /// Natural logarithm of the opacity after the sigmoid.
@@ -37,11 +38,11 @@ pub(in crate::packed) struct Canonical {
     pub(in crate::packed) dc: Vec3,
 }
 
-/// A Gaussian's place in a packed scene.
+/// The place of a Gaussian in a packed scene. Keys are compared by cell, then by index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct MortonKey {
     pub(crate) cell: u64,
-    /// Its index in the scene.
+    /// The index of the Gaussian in the scene.
     pub(crate) source: u32,
 }
 
@@ -51,7 +52,7 @@ impl MortonKey {
     }
 }
 
-/// Smallest and largest coordinates; 0 if there are no positions.
+/// Smallest and largest coordinates of positions. Both are 0 if there are no positions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Bounds {
     least: Vec3,
@@ -67,18 +68,18 @@ impl Bounds {
         bounds
     }
 
-    /// The bounds of the same positions relative to another offset.
+    /// Returns the bounds of the same positions, which are relative to the offset `from`, relative to the offset `to`.
     pub(in crate::packed) fn rebased(mut self, from: Option<Offset>, to: Option<Offset>) -> Self {
-        // Moving and rounding keep the order of numbers.
+        // Shifting and rounding keep the order of numbers, so the smallest coordinate stays the smallest.
         shift(std::slice::from_mut(&mut self.least), from, to);
         shift(std::slice::from_mut(&mut self.most), from, to);
         self
     }
 
-    /// Includes `other`.
+    /// Extends the bounds so that they include `other`.
     pub(crate) fn add(&mut self, other: Self) {
         for k in 0..3 {
-            // The corner of the grid has always been found by `total_cmp`, which orders -0 before 0.
+            // `total_cmp` orders -0 before 0. The corner of the grid depends on this, and files depend on the corner.
             self.least[k] = std::cmp::min_by(self.least[k], other.least[k], f32::total_cmp);
             self.most[k] = std::cmp::max_by(self.most[k], other.most[k], f32::total_cmp);
         }
@@ -93,12 +94,12 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// A grid over all positions. Its cells hold about one Gaussian where most Gaussians are.
+    /// Fits a grid that covers all positions.
     pub(in crate::packed) fn fit(positions: &[Vec3]) -> Self {
         Self::fit_sample(positions, Bounds::of(positions), positions.len())
     }
 
-    /// [`Self::fit`] for `total` positions within `bounds`, from a sample of them.
+    /// Fits a grid as [`Self::fit`] does for `total` positions within `bounds`, from a sample of the positions.
     pub(crate) fn fit_sample(sample: &[Vec3], bounds: Bounds, total: usize) -> Self {
         let mut bulk = 0.0_f64;
         for k in 0..3 {
@@ -110,7 +111,7 @@ impl Grid {
         let Bounds { least: origin, most } = bounds;
         let whole = (0..3).map(|k| f64::from(most[k]) - f64::from(origin[k])).fold(0.0, f64::max);
         let wanted = bulk / libm::cbrt(CELLS_PER_GAUSSIAN * total.max(1) as f64);
-        // All coordinates must fit, and cells must not be empty.
+        // All coordinates must fit in `morton::BITS` bits, and a cell must have a side above 0.
         let least = whole / f64::from((1_u32 << morton::BITS) - 2);
         let cell = wanted.max(least).max(whole * 1e-6).max(1e-9);
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
@@ -118,7 +119,7 @@ impl Grid {
         Self { origin, cell }
     }
 
-    /// Number of the cell of `position` on the Morton curve.
+    /// Returns the number of the cell of `position` on the Morton curve.
     pub(crate) fn cell(&self, position: Vec3) -> u64 {
         let most = f64::from((1_u32 << morton::BITS) - 1);
         morton::encode(std::array::from_fn(|k| {
@@ -129,7 +130,7 @@ impl Grid {
         }))
     }
 
-    /// The places of all Gaussians, in the order of `geometry`.
+    /// Returns the key of each Gaussian, in the order of `geometry`.
     pub(in crate::packed) fn keys(&self, geometry: &Geometry) -> Vec<MortonKey> {
         // Scenes have at most 2^32 - 2 Gaussians.
         let key = |(source, &position)| MortonKey { cell: self.cell(position), source };
@@ -137,13 +138,13 @@ impl Grid {
     }
 }
 
-/// Gaussian `i` in canonical form.
+/// Returns Gaussian `i` in canonical form.
 pub(in crate::packed) fn canonical(geometry: &Geometry, i: usize) -> Canonical {
     let scales = geometry.scales[i];
     let order = longest_first(scales);
     let given = columns(geometry.rotations[i]);
     let [first, second, third] = order.map(|k| given[k]);
-    // An ellipsoid does not change when an axis is reversed.
+    // An ellipsoid does not change when one of its axes is reversed.
     let third = if dot(cross(first, second), third) < 0.0 { third.map(|v| -v) } else { third };
     let drawn = scales[order[0]] <= MAX_DRAWN_LOG_SCALE;
     let log_opacity = if drawn { log_sigmoid(geometry.opacities[i]) } else { MIN_LOG_OPACITY };

@@ -1,10 +1,10 @@
-//! An order in which neighbours follow one another.
+//! An order of Gaussians in which neighbours in space follow one another.
 
 use super::canonical::Grid;
 use crate::scene::splats::Geometry;
 
-/// Indices of the Gaussians of `geometry` along a Morton curve, the one of packed files. Gaussians that follow one another are
-/// neighbours, so pictures of a scene in this order are drawn faster.
+/// Returns the indices of the Gaussians of `geometry` in the order of packed files, along a Morton curve. Gaussians that
+/// follow one another are near one another in space, so pictures of a scene in this order are drawn faster.
 #[must_use]
 pub fn curve_order(geometry: &Geometry) -> Vec<u32> {
     let mut keys = Grid::fit(&geometry.positions).keys(geometry);
