@@ -1,4 +1,4 @@
-//! What is known of some rows of a tile before the scene is planned.
+//! Surveys of the rows of a tile, from which a scene is planned.
 
 use std::ops::Range;
 
@@ -17,27 +17,27 @@ use crate::support::maths::Vec3;
 use crate::support::progress::Progress;
 use crate::support::rng::SplitMix64;
 
-/// Rows that are surveyed and counted together.
+/// Most rows of a survey.
 pub const BLOCK: usize = 262_144;
-/// Of so many rows the position of one is kept. Grid and buckets depend on these.
+/// Number of rows of which the position of one is kept. The grid and the buckets depend on these positions.
 pub(super) const STRIDE: usize = 128;
-/// Mixed into the seed of the choice of rows.
+/// Mixed into the seed with which rows are chosen.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
-/// What is known of a block of rows of a tile.
+/// A survey of a block of rows of a tile.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Survey {
     pub(super) gaussians: u64,
     pub(super) bounds: Option<Bounds>,
-    /// Sum of the expected weights of all.
+    /// Sum of the guessed weights of all Gaussians of the block.
     pub(super) guessed_total: f64,
-    /// Rows of the block and their positions, one of every [`STRIDE`] rows.
+    /// The number in the block, and the position, of one of every [`STRIDE`] rows.
     pub(super) positions: Vec<(u32, Vec3)>,
     pub(super) like: Like,
 }
 messages!(Survey => "survey");
 
-/// What all tiles of a scene have in common.
+/// The properties in which all tiles of a scene agree.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Like {
     pub(super) degree: ShDegree,
@@ -55,7 +55,8 @@ impl Like {
         }
     }
 
-    /// Refuses a tile of so many Gaussians that has none or does not go together with those `before`.
+    /// Refuses a tile that has no Gaussians, or that does not agree with `before`. `gaussians` is the number of Gaussians
+    /// of the tile.
     pub(super) fn check(&self, name: &str, before: Option<&Self>, gaussians: u64) -> Result<()> {
         let wrong = match before.and_then(|before| before.difference(self)) {
             _ if gaussians == 0 => "no Gaussians".to_owned(),
@@ -65,7 +66,7 @@ impl Like {
         Err(Error::malformed(name, format!("the tile has {wrong}")))
     }
 
-    /// What of `next` does not go together with this.
+    /// Returns a description of the first property in which `next` does not agree with `self`; `None` if they agree.
     pub(super) fn difference(&self, next: &Self) -> Option<String> {
         if self.degree != next.degree {
             let (own, other) = (self.degree.get(), next.degree.get());
@@ -89,11 +90,11 @@ impl Like {
 }
 
 impl Survey {
-    /// Looks at `rows` of `tile`, at most [`BLOCK`] of them, which begin at a multiple of it. Reports their bytes to
+    /// Surveys `rows` of `tile`: at most [`BLOCK`] rows, which begin at a multiple of it. Reports their bytes to
     /// `progress`.
     ///
     /// # Errors
-    /// Those of reading, and [`crate::Error::Cancelled`].
+    /// Those of reading the tile, and [`crate::Error::Cancelled`].
     pub fn of(
         tile: &dyn SplatSource,
         rows: Range<usize>,
@@ -117,7 +118,7 @@ impl Survey {
             survey.bounds.get_or_insert(bounds).add(bounds);
             survey.guessed_total = guessed_total(survey.guessed_total, geometry);
             while let Some(row) = chosen.next_if(|row| own.contains(row)) {
-                // Blocks have few rows.
+                // A block has at most [`BLOCK`] rows.
                 let number = u32::try_from(row - rows.start).unwrap_or(u32::MAX);
                 survey.positions.push((number, geometry.positions[row - own.start]));
             }
@@ -126,8 +127,8 @@ impl Survey {
         Ok(survey)
     }
 
-    /// Refuses the tile `name` that this block is of, if it has no Gaussians or does not go together with the tile that `before` is
-    /// of.
+    /// Refuses the tile `name` of this block if the block has no Gaussians, or if the tile does not agree with the tile of
+    /// `before`.
     ///
     /// # Errors
     /// [`Error::Format`] that names the tile.
@@ -135,7 +136,8 @@ impl Survey {
         self.like.check(name, before.map(|before| &before.like), self.gaussians)
     }
 
-    /// Refuses a tile that has no Gaussians or does not go together with those before, which are like `before`.
+    /// Refuses the tile `name` if it has no Gaussians, or if it does not agree with `before`, an empty scene with the
+    /// properties of earlier tiles.
     pub(crate) fn check_tile(
         name: &str,
         before: Option<&Splats>,
@@ -145,13 +147,13 @@ impl Survey {
         Like::of(own).check(name, before.map(Like::of).as_ref(), gaussians as u64)
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         usize::try_from(self.gaussians).unwrap_or(usize::MAX)
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.gaussians == 0
