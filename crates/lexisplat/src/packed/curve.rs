@@ -1,4 +1,4 @@
-//! An order in which neighbours follow one another.
+//! The canonical form of a scene: each ellipsoid in one of its 24 descriptions, and the Gaussians in the order of cells.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,16 +7,16 @@ use crate::scene::offset::{Offset, shift};
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, at_share};
 
-/// Cells along the longest side of the bulk, for each Gaussian in it.
+/// Number of cells for each Gaussian, in a cube whose side is the longest side of the bulk of the scene.
 const CELLS_PER_GAUSSIAN: f64 = 3000.0;
-/// Share of the Gaussians at either end of each axis that are not part of the bulk.
+/// Share of the positions at each end of each axis that are not part of the bulk.
 const TRIM: f64 = 0.01;
 
-/// A Gaussian's place in a packed scene.
+/// The place of a Gaussian in a packed scene. Keys are compared by cell, then by index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct MortonKey {
     pub(crate) cell: u64,
-    /// Its index in the scene.
+    /// The index of the Gaussian in the scene.
     pub(crate) source: u32,
 }
 
@@ -26,7 +26,7 @@ impl MortonKey {
     }
 }
 
-/// Smallest and largest coordinates; 0 if there are no positions.
+/// Smallest and largest coordinates of positions. Both are 0 if there are no positions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Bounds {
     least: Vec3,
@@ -42,18 +42,18 @@ impl Bounds {
         bounds
     }
 
-    /// The bounds of the same positions relative to another offset.
+    /// Returns the bounds of the same positions, which are relative to the offset `from`, relative to the offset `to`.
     pub(in crate::packed) fn rebased(mut self, from: Option<Offset>, to: Option<Offset>) -> Self {
-        // Moving and rounding keep the order of numbers.
+        // Shifting and rounding keep the order of numbers, so the smallest coordinate stays the smallest.
         shift(std::slice::from_mut(&mut self.least), from, to);
         shift(std::slice::from_mut(&mut self.most), from, to);
         self
     }
 
-    /// Includes `other`.
+    /// Extends the bounds so that they include `other`.
     pub(crate) fn add(&mut self, other: Self) {
         for k in 0..3 {
-            // The corner of the grid has always been found by `total_cmp`, which orders -0 before 0.
+            // `total_cmp` orders -0 before 0. The corner of the grid depends on this, and files depend on the corner.
             self.least[k] = std::cmp::min_by(self.least[k], other.least[k], f32::total_cmp);
             self.most[k] = std::cmp::max_by(self.most[k], other.most[k], f32::total_cmp);
         }
@@ -68,12 +68,12 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// A grid over all positions. Its cells hold about one Gaussian where most Gaussians are.
+    /// Fits a grid that covers all positions.
     pub(in crate::packed) fn fit(positions: &[Vec3]) -> Self {
         Self::fit_sample(positions, Bounds::of(positions), positions.len())
     }
 
-    /// [`Self::fit`] for `total` positions within `bounds`, from a sample of them.
+    /// Fits a grid as [`Self::fit`] does for `total` positions within `bounds`, from a sample of the positions.
     pub(crate) fn fit_sample(sample: &[Vec3], bounds: Bounds, total: usize) -> Self {
         let mut bulk = 0.0_f64;
         for k in 0..3 {
@@ -85,7 +85,7 @@ impl Grid {
         let Bounds { least: origin, most } = bounds;
         let whole = (0..3).map(|k| f64::from(most[k]) - f64::from(origin[k])).fold(0.0, f64::max);
         let wanted = bulk / libm::cbrt(CELLS_PER_GAUSSIAN * total.max(1) as f64);
-        // All coordinates must fit, and cells must not be empty.
+        // All coordinates must fit in `morton::BITS` bits, and a cell must have a side above 0.
         let least = whole / f64::from((1_u32 << morton::BITS) - 2);
         let cell = wanted.max(least).max(whole * 1e-6).max(1e-9);
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
@@ -93,7 +93,7 @@ impl Grid {
         Self { origin, cell }
     }
 
-    /// Number of the cell of `position` on the Morton curve.
+    /// Returns the number of the cell of `position` on the Morton curve.
     pub(crate) fn cell(&self, position: Vec3) -> u64 {
         let most = f64::from((1_u32 << morton::BITS) - 1);
         morton::encode(std::array::from_fn(|k| {
@@ -104,7 +104,7 @@ impl Grid {
         }))
     }
 
-    /// The places of all Gaussians, in the order of `geometry`.
+    /// Returns the key of each Gaussian, in the order of `geometry`.
     pub(in crate::packed) fn keys(&self, geometry: &Geometry) -> Vec<MortonKey> {
         // Scenes have at most 2^32 - 2 Gaussians.
         let key = |(source, &position)| MortonKey { cell: self.cell(position), source };
@@ -112,8 +112,8 @@ impl Grid {
     }
 }
 
-/// Indices of the Gaussians of `geometry` along a Morton curve, the one of packed files. Gaussians that follow one another are
-/// neighbours, so pictures of a scene in this order are drawn faster.
+/// Returns the indices of the Gaussians of `geometry` in the order of packed files, along a Morton curve. Gaussians that
+/// follow one another are near one another in space, so pictures of a scene in this order are drawn faster.
 #[must_use]
 pub fn curve_order(geometry: &Geometry) -> Vec<u32> {
     let mut keys = Grid::fit(&geometry.positions).keys(geometry);

@@ -1,12 +1,12 @@
-//! The packed form: every attribute quantised as far as pictures allow and entropy-coded.
+//! The packed form of a scene: every attribute is quantised as coarsely as pictures allow, and entropy-coded.
 //!
-//! [`Packer`] takes a scene and its [`Sensitivity`](crate::Sensitivity) and makes [`Packed`] scenes of any quality;
-//! [`Packed::unpack`] gives back a [`Model`](crate::Model) whose SH stay sparse codes. docs/METHOD.md has
-//! the mathematics, docs/FORMAT.md the bytes.
+//! [`Packer`] takes a scene and its [`Sensitivity`](crate::Sensitivity), and makes [`Packed`] scenes of any quality.
+//! [`Packed::unpack`] returns a [`Model`](crate::Model) whose SH coefficients stay sparse codes. docs/METHOD.md has the
+//! mathematics, docs/FORMAT.md the bytes.
 //!
-//! `bitstream/` is what both sides share, `entropy/` the coder of its symbols. `encode/` and `decode/` are the two sides. An
-//! encoder and a decoder of the syntax are one function, such as `bitstream/geometry_syntax.rs`, over something that writes symbols
-//! or reads them.
+//! `encode/` is the encoder and `decode/` the decoder. `bitstream/` is the syntax that they share, `entropy/` the coder of
+//! its symbols. One function both encodes and decodes a part of the syntax, for instance in `bitstream/geometry_syntax.rs`.
+//! It is generic over a type that writes symbols or reads them.
 
 mod bitstream;
 mod curve;

@@ -1,8 +1,8 @@
-//! Presets of quality.
+//! Presets of the quality of packed files.
 
 use crate::sparse::model::named;
 
-/// A quality of packed files.
+/// A quality of packed files, as an expected average PSNR.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Preset {
     /// For phones: about 35 dB.
@@ -17,10 +17,10 @@ pub enum Preset {
 }
 
 impl Preset {
-    /// All of them, smallest files first.
+    /// All presets, smallest files first.
     pub const ALL: [Self; 4] = [Self::Small, Self::Balanced, Self::High, Self::Archive];
 
-    /// The expected average PSNR in dB, for [`Packer::step_for`](crate::packed::Packer::step_for).
+    /// Returns the expected average PSNR in dB, for [`Packer::step_for`](crate::packed::Packer::step_for).
     #[must_use]
     pub fn decibels(self) -> f64 {
         match self {

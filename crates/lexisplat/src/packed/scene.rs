@@ -9,13 +9,13 @@ use crate::sparse::model::Record;
 use crate::support::limits::Limits;
 use crate::support::spill::{Spilled, Woven};
 
-/// What errors call a packed scene that was not read from a file.
+/// The file name in errors about a packed scene that was not read from a file.
 pub(super) const UNNAMED: &str = "the packed scene";
 
-/// Everything of a packed scene that is not as long as the scene.
+/// The parts of a packed scene whose size does not depend on the number of Gaussians.
 #[derive(Debug, Clone)]
 pub struct PackedHead {
-    /// The file, as the caller named it.
+    /// The file name, as the caller gave it. It is used in errors.
     pub(crate) file: String,
     /// SH degree.
     pub degree: ShDegree,
@@ -25,25 +25,24 @@ pub struct PackedHead {
     pub removed: u64,
     /// Number of atoms; 0 for degree 0.
     pub atoms: usize,
-    /// How it was made and what it promises.
+    /// How the file was made, and which error it promises.
     pub record: Record,
     /// Comments and marks of the source.
     pub meta: SceneMeta,
-    /// What a search for a quality or a size asked for and reached, if there was one.
+    /// The quality or the size that a search asked for, and what it reached. `None` without a search.
     pub target: Option<TargetRecord>,
-    /// What views showed of the file, if views judged it.
+    /// The quality of the file in the views that judged it. `None` if no view did.
     pub reached: Option<ReachedRecord>,
-    /// The GPU that measured the sensitivity; `None` for the CPU renderer, whose results are the same
-    /// everywhere.
+    /// The GPU that measured the sensitivity. `None` for the CPU renderer, whose results are the same everywhere.
     pub device: Option<String>,
-    /// What it is decoded with, and where its chunks are, as a file holds it; see `bitstream/head.rs`.
+    /// The tensor `packed.head`: the parameters of the decoder and the index of chunks; see `bitstream/head.rs`.
     pub(crate) bytes: Vec<u8>,
-    /// What may be made of it: the limits of the reader, or the default ones.
+    /// Limits on what a reader may make of the scene: those of its reader, or the default ones.
     pub(crate) limits: Limits,
 }
 
 impl PartialEq for PackedHead {
-    /// Compares what is written to a file, and neither the name of the file nor the limits of its reader.
+    /// Compares everything that is written to a file. The name of the file and the limits of its reader do not count.
     fn eq(&self, other: &Self) -> bool {
         (self.degree, self.gaussians, self.removed, self.atoms)
             == (other.degree, other.gaussians, other.removed, other.atoms)
@@ -63,76 +62,77 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// `extras` are in the order of the file, and `order` holds the place of each Gaussian in the source.
+    /// Creates a packed scene. `extras` are in the order of the file. `order` holds the place in the source of each
+    /// Gaussian of the file.
     pub(crate) fn new(head: PackedHead, extras: Vec<Extra>, order: Option<Vec<u32>>, data: Vec<u8>) -> Self {
         Self { head, extras, order, data }
     }
 
-    /// Everything that is not as long as the scene.
+    /// Returns the parts whose size does not depend on the number of Gaussians.
     #[must_use]
     pub fn head(&self) -> &PackedHead {
         &self.head
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         self.head.gaussians
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.head.gaussians == 0
     }
 
-    /// Properties that 3DGS does not define, in the order of the file.
+    /// Returns the properties that 3DGS does not define, in the order of the file.
     #[must_use]
     pub fn extras(&self) -> &[Extra] {
         &self.extras
     }
 
-    /// For each Gaussian its place in the source, if the order was kept.
+    /// Returns the place in the source of each Gaussian of the file. `None` if the order was not kept.
     #[must_use]
     pub fn order(&self) -> Option<&[u32]> {
         self.order.as_deref()
     }
 
-    /// The entropy-coded dictionary and chunks.
+    /// Returns the entropy-coded ranges of all chunks.
     #[must_use]
     pub fn data(&self) -> &[u8] {
         &self.data
     }
 
-    /// The same with what a search asked for and reached.
+    /// Replaces the record of what a search asked for and reached.
     #[must_use]
     pub fn with_target(mut self, target: impl Into<Option<TargetRecord>>) -> Self {
         self.head.target = target.into();
         self
     }
 
-    /// The same with what views showed of it.
+    /// Replaces the record of what views showed of the file.
     #[must_use]
     pub fn with_reached(mut self, reached: impl Into<Option<ReachedRecord>>) -> Self {
         self.head.reached = reached.into();
         self
     }
 
-    /// The same with the number of Gaussians that were left out in all; see [`PackedHead::removed`].
+    /// Replaces the number of Gaussians that were left out in all; see [`PackedHead::removed`].
     #[must_use]
     pub fn with_removed(mut self, removed: u64) -> Self {
         self.head.removed = removed;
         self
     }
 
-    /// The same with the GPU that measured the sensitivity; see [`PackedHead::device`].
+    /// Replaces the name of the GPU that measured the sensitivity; see [`PackedHead::device`].
     #[must_use]
     pub fn with_device(mut self, device: Option<String>) -> Self {
         self.head.device = device;
         self
     }
 
-    /// The same with other limits on what may be made of it.
+    /// Replaces the limits on what a reader may make of the scene.
     #[must_use]
     pub fn with_limits(mut self, limits: Limits) -> Self {
         self.head.limits = limits;
@@ -140,37 +140,38 @@ impl Packed {
     }
 }
 
-/// What of a packed scene is as long as the scene, spilled.
+/// The parts of a packed scene whose size grows with the number of Gaussians, in spill files.
 #[cfg(feature = "encode")]
 #[derive(Debug)]
 pub(crate) struct SpilledPacked {
     pub(crate) data: Woven,
-    /// Of each layer the number of Gaussians, and the values.
+    /// For each layer, its number of Gaussians, and their places in the source.
     pub(crate) order: Option<Vec<(usize, Spilled)>>,
-    /// Names and types, and the same of each.
+    /// For each property that 3DGS does not define, its name and type, and for each layer the number of Gaussians and their
+    /// values.
     pub(crate) extras: Vec<(Extra, Vec<(usize, Spilled)>)>,
 }
 
-/// What a search for a quality or a size asked for and reached.
+/// The quality or the size that a search asked for, and what it reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TargetRecord {
-    /// `psnr`, `min-psnr` or `size`.
+    /// The kind of the search: `psnr`, `min-psnr` or `size`.
     pub kind: String,
-    /// Decibels or bytes asked for.
+    /// The target of the search: decibels for `psnr` and `min-psnr`, bytes for `size`.
     pub asked: f64,
-    /// Mean PSNR over the views searched with, in decibels.
+    /// Mean PSNR over the views of the search, in decibels.
     pub mean_psnr: f64,
-    /// Least PSNR of a view, in decibels.
+    /// Least PSNR of any of these views, in decibels.
     pub min_psnr: f64,
     /// Number of views.
     pub views: u32,
-    /// Whether the views were given. Otherwise they were generated.
+    /// Whether the caller gave the views. Otherwise they were generated.
     pub cameras: bool,
 }
 
 impl TargetRecord {
-    /// Puts a record together. `reached` is the mean and the least PSNR.
+    /// Creates a record. `reached` is the mean PSNR and the least PSNR, in decibels.
     #[must_use]
     pub fn new(kind: &str, asked: f64, reached: [f64; 2], views: u32, cameras: bool) -> Self {
         let [mean_psnr, min_psnr] = reached;
@@ -178,9 +179,9 @@ impl TargetRecord {
     }
 }
 
-/// What a packed file shows of its scene over the views that judged it.
+/// The quality of a packed file in the views that judged it.
 ///
-/// Serialized, it is the member `reached` of reports.
+/// It is serialized as the member `reached` of reports.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ReachedRecord {
@@ -192,12 +193,12 @@ pub struct ReachedRecord {
     pub min_psnr: f64,
     /// Number of views.
     pub views: u32,
-    /// Whether the views were given. Otherwise they were found.
+    /// Whether the caller gave the views. Otherwise they were found.
     pub cameras: bool,
 }
 
 impl ReachedRecord {
-    /// Puts a record together. `psnr` is the judged, the mean and the least one.
+    /// Creates a record. `psnr` is the judged, the mean and the least PSNR, in decibels.
     #[must_use]
     pub fn new(psnr: [f64; 3], views: u32, cameras: bool) -> Self {
         let [judged_psnr, mean_psnr, min_psnr] = psnr;

@@ -7,7 +7,7 @@ use super::sh::ShDegree;
 use super::splats::{SceneMeta, Splats};
 use crate::support::error::{Error, Result};
 
-/// What all tiles of a scene have in common.
+/// The properties in which all tiles of a scene agree.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct TileKind {
     pub(crate) degree: ShDegree,
@@ -25,7 +25,8 @@ impl TileKind {
         }
     }
 
-    /// Refuses a tile of so many Gaussians that has none or does not go together with those `before`.
+    /// Refuses a tile that has no Gaussians, or that does not agree with `before`. `gaussians` is the number of Gaussians
+    /// of the tile.
     pub(crate) fn check(&self, name: &str, before: Option<&Self>, gaussians: u64) -> Result<()> {
         let wrong = match before.and_then(|before| before.difference(self)) {
             _ if gaussians == 0 => "no Gaussians".to_owned(),
@@ -35,7 +36,7 @@ impl TileKind {
         Err(Error::malformed(name, format!("the tile has {wrong}")))
     }
 
-    /// What of `next` does not go together with this.
+    /// Returns a description of the first property in which `next` does not agree with `self`; `None` if they agree.
     pub(crate) fn difference(&self, next: &Self) -> Option<String> {
         if self.degree != next.degree {
             let (own, other) = (self.degree.get(), next.degree.get());

@@ -1,18 +1,18 @@
-//! Unit-norm atoms of any length. A [`Dictionary`](crate::Dictionary) is atoms of the length that an SH degree has.
+//! Unit-norm atoms of any length. A [`Dictionary`](crate::Dictionary) has atoms of the length of the SH-rest of its degree.
 
 use crate::sparse::row_value::RowValue;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 
-/// Longest atoms. Learning begins with the principal axes of a sample, whose cost grows with the cube of the length: at
-/// this length they take about half a minute. The working memory of a pursuit is then 8 MiB a thread.
+/// Largest length of an atom. Learning starts with the principal axes of a sample, whose cost grows with the cube of the
+/// length. At this length they take about half a minute, and the working memory of a pursuit is 8 MiB a thread.
 pub const MAX_DIM: usize = 1024;
-/// Largest distance of an atom's norm from 1. It leaves room for the f32 rounding of [`MAX_DIM`] values.
+/// Largest difference of an atom's norm from 1. It is large enough for the f32 rounding of [`MAX_DIM`] values.
 const NORM_TOLERANCE: f64 = 1e-5;
 
-/// `len` atoms of unit norm with `dim` values each.
+/// A list of atoms of unit norm with `dim` values each.
 ///
-/// There are none only in a dictionary of SH degree 0, whose rows have no values.
+/// Only a dictionary of SH degree 0, whose rows have no values, has no atoms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Atoms {
     dim: usize,
@@ -20,17 +20,17 @@ pub struct Atoms {
 }
 
 impl Atoms {
-    /// Atoms from `values`, stored one after the other, each `dim` long.
+    /// Creates atoms from `values`, which has the atoms one after the other, each of `dim` values.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `dim` is not from 1 to [`MAX_DIM`], if the length is not a whole number of atoms, if
-    /// there are no atoms or more than [`MAX_ATOMS`], or if an atom does not have unit norm (to within 1e-5).
+    /// [`Error::Parameter`] if `dim` is not from 1 to [`MAX_DIM`], if `values` is not a whole number of atoms, if there are
+    /// no atoms or more than [`MAX_ATOMS`], or if an atom does not have unit norm (to within 1e-5).
     pub fn new(dim: usize, values: Vec<f32>) -> Result<Self> {
         check_dim(dim)?;
         Self::checked(dim, values)
     }
 
-    /// [`Self::new`] for a `dim` that is known to be in range.
+    /// Creates atoms as [`Self::new`] does, for a `dim` that is known to be in range.
     pub(super) fn checked(dim: usize, values: Vec<f32>) -> Result<Self> {
         if values.is_empty() || !values.len().is_multiple_of(dim) || values.len() / dim > MAX_ATOMS {
             let expected = format!("1 to {MAX_ATOMS} atoms of {dim} values");
@@ -45,7 +45,7 @@ impl Atoms {
         }
     }
 
-    /// The same for atoms that were decoded, whose decoder says itself what is wrong.
+    /// Creates atoms that were decoded. `None` if [`Self::new`] would refuse them; the decoder reports the error.
     pub(super) fn decoded(dim: usize, values: Vec<f32>) -> Option<Self> {
         let atoms = Self { dim, values };
         let len = atoms.len();
@@ -53,12 +53,12 @@ impl Atoms {
         (fits && atoms.odd_norm().is_none()).then_some(atoms)
     }
 
-    /// No atoms for rows without values.
+    /// Creates an empty list, for rows without values.
     pub(super) fn none() -> Self {
         Self { dim: 0, values: Vec::new() }
     }
 
-    /// The number and the norm of the first atom whose norm is not 1.
+    /// Returns the number and the norm of the first atom whose norm is not 1.
     fn odd_norm(&self) -> Option<(usize, f64)> {
         let norm = |atom: &[f32]| atom.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt();
         let norms = self.values.chunks_exact(self.dim.max(1)).map(norm).enumerate();
@@ -66,25 +66,25 @@ impl Atoms {
         norms.into_iter().find(|&(_, norm)| is_odd(norm))
     }
 
-    /// Values of an atom, and of the rows that the atoms code.
+    /// Returns the number of values of an atom, and of the rows that the atoms code.
     #[must_use]
     pub fn dim(&self) -> usize {
         self.dim
     }
 
-    /// Number of atoms.
+    /// Returns the number of atoms.
     #[must_use]
     pub fn len(&self) -> usize {
         self.values.len().checked_div(self.dim).unwrap_or(0)
     }
 
-    /// Whether there are no atoms (SH degree 0).
+    /// Returns whether there are no atoms (SH degree 0).
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// Atom `j`.
+    /// Returns atom `j`.
     ///
     /// # Panics
     /// If `j` is not below [`Self::len`].
@@ -94,14 +94,14 @@ impl Atoms {
         &self.values[j * self.dim..(j + 1) * self.dim]
     }
 
-    /// All atoms, one after the other.
+    /// Returns all atoms, one after the other.
     #[must_use]
     pub fn as_slice(&self) -> &[f32] {
         &self.values
     }
 
-    /// Sums `value * atom` into `out` in the order given, with one f32 multiplication and one f32 addition at a time:
-    /// exactly the row whose error a [`Coder`](crate::pursuit::Coder) reports.
+    /// Sums `value * atom` into `out`, in the order of `code`, with one f32 multiplication and one f32 addition at a time.
+    /// The result is exactly the row whose error a [`Coder`](crate::pursuit::Coder) reports.
     ///
     /// # Panics
     /// If an atom's number is not below [`Self::len`].
@@ -116,7 +116,7 @@ impl Atoms {
     }
 }
 
-/// Refuses lengths of rows that atoms cannot have.
+/// Refuses a length of rows that atoms cannot have.
 pub(super) fn check_dim(dim: usize) -> Result<()> {
     match dim {
         1..=MAX_DIM => Ok(()),
@@ -124,7 +124,7 @@ pub(super) fn check_dim(dim: usize) -> Result<()> {
     }
 }
 
-/// The number of rows in `rows`, each of `dim` values.
+/// Returns the number of rows in `rows`, each of `dim` values.
 pub(super) fn count_rows<V>(dim: usize, rows: &[V]) -> Result<usize> {
     if dim == 0 || !rows.len().is_multiple_of(dim) {
         let expected = format!("a whole number of rows of {dim} values");
@@ -135,7 +135,7 @@ pub(super) fn count_rows<V>(dim: usize, rows: &[V]) -> Result<usize> {
 
 /// Refuses `rows`, each of `dim` values, if one holds NaN or infinity. Errors call the first row number `first`.
 pub(super) fn check_finite<V: RowValue>(dim: usize, rows: &[V], first: usize) -> Result<()> {
-    // Without a way out the loop is vectorised.
+    // The loop has no early exit, so that it is vectorised.
     let good = rows.iter().fold(true, |good, v| good & v.wide().is_finite());
     if good {
         return Ok(());

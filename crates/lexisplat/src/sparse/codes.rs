@@ -1,4 +1,4 @@
-//! Sparse codes: for every Gaussian a few (atom, value) pairs, which are a sparse column of a matrix.
+//! Sparse codes: a few pairs (atom, value) for every Gaussian. They are a sparse column of a matrix.
 
 use half::f16;
 use half::slice::HalfFloatSliceExt;
@@ -7,7 +7,7 @@ use crate::sparse::dictionary::Dictionary;
 use crate::support::error::{Error, Result};
 use crate::support::maths::name_of;
 
-/// Gaussians between two stored offsets. To find a column, fewer than this many counts are added up.
+/// Number of Gaussians between two stored offsets. To find a column, fewer counts than this are added up.
 const GAUSSIANS_PER_CHECKPOINT: usize = 64;
 
 /// Precision of the stored values. The error is verified after the values are rounded to it.
@@ -19,12 +19,12 @@ pub enum ValueType {
     F16,
 }
 
-/// Atom numbers. They take one byte each if the dictionary has at most 256 atoms.
+/// Atom numbers. Each takes one byte if the dictionary has at most 256 atoms, otherwise two.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Indices {
-    /// Dictionaries of up to 256 atoms.
+    /// Numbers for dictionaries of up to 256 atoms.
     U8(Vec<u8>),
-    /// Larger ones.
+    /// Numbers for larger dictionaries.
     U16(Vec<u16>),
 }
 
@@ -38,13 +38,13 @@ pub enum Values {
 }
 
 impl Indices {
-    /// An empty list for a dictionary of `atoms` atoms.
+    /// Creates an empty list for a dictionary of `atoms` atoms.
     #[must_use]
     pub fn for_atoms(atoms: usize) -> Self {
         if atoms <= 256 { Self::U8(Vec::new()) } else { Self::U16(Vec::new()) }
     }
 
-    /// Number of indices.
+    /// Returns the number of indices.
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::U8(v) => v.len(),
@@ -52,10 +52,10 @@ impl Indices {
         }
     }
 
-    /// Index at `k`.
+    /// Returns the index at `k`.
     ///
     /// # Panics
-    /// If there are not more than `k`.
+    /// If `k` is not below the number of indices.
     #[must_use]
     #[inline]
     pub fn get(&self, k: usize) -> usize {
@@ -65,7 +65,7 @@ impl Indices {
         }
     }
 
-    /// All indices as they lie in memory.
+    /// Returns all indices as they lie in memory.
     pub(crate) fn as_bytes(&self) -> &[u8] {
         match self {
             Self::U8(v) => v,
@@ -73,7 +73,8 @@ impl Indices {
         }
     }
 
-    /// Whether those of each Gaussian are at most `dim`, ascending and below `atoms`. `counts` add up to their number.
+    /// Returns whether each Gaussian has at most `dim` indices, and they are ascending and below `atoms`. The sum of
+    /// `counts` must be the number of indices.
     fn are_sound(&self, counts: &[u8], dim: usize, atoms: usize) -> bool {
         fn sound<T: Copy + Ord + Into<usize>>(
             indices: &[T],
@@ -95,7 +96,7 @@ impl Indices {
         }
     }
 
-    /// Bytes of one index.
+    /// Returns the number of bytes of one index.
     #[must_use]
     pub fn width(&self) -> usize {
         match self {
@@ -106,7 +107,7 @@ impl Indices {
 }
 
 impl Values {
-    /// An empty list of values of type `value_type`.
+    /// Creates an empty list of values of type `value_type`.
     #[must_use]
     pub fn empty(value_type: ValueType) -> Self {
         match value_type {
@@ -115,7 +116,7 @@ impl Values {
         }
     }
 
-    /// Type of the values.
+    /// Returns the type of the values.
     #[must_use]
     pub fn value_type(&self) -> ValueType {
         match self {
@@ -124,7 +125,7 @@ impl Values {
         }
     }
 
-    /// Number of values.
+    /// Returns the number of values.
     pub(crate) fn len(&self) -> usize {
         match self {
             Self::F32(v) => v.len(),
@@ -132,10 +133,10 @@ impl Values {
         }
     }
 
-    /// Value at `k`.
+    /// Returns the value at `k`.
     ///
     /// # Panics
-    /// If there are not more than `k`.
+    /// If `k` is not below the number of values.
     #[must_use]
     #[inline]
     pub fn get(&self, k: usize) -> f32 {
@@ -145,25 +146,25 @@ impl Values {
         }
     }
 
-    /// Whether none is infinite or no number.
+    /// Returns whether all values are finite.
     fn are_finite(&self) -> bool {
-        // Without a way out the loop is vectorised.
+        // The loop has no early exit, so that it is vectorised.
         match self {
             Self::F32(v) => v.iter().fold(true, |good, v| good & v.is_finite()),
             Self::F16(v) => v.iter().fold(true, |good, v| good & v.is_finite()),
         }
     }
 
-    /// All values as they lie in memory.
+    /// Returns all values as they lie in memory.
     pub(crate) fn as_bytes(&self) -> &[u8] {
         match self {
             Self::F32(v) => bytemuck::cast_slice(v),
-            // `bytemuck` knows half floats as integers.
+            // `bytemuck` casts half floats only as integers.
             Self::F16(v) => bytemuck::cast_slice::<u16, u8>(v.reinterpret_cast()),
         }
     }
 
-    /// Bytes of one value.
+    /// Returns the number of bytes of one value.
     #[must_use]
     pub fn width(&self) -> usize {
         match self {
@@ -176,9 +177,9 @@ impl Values {
 /// Gaussians whose SH-rest is stored exactly, because no code reaches the tolerance.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Escapes {
-    /// Their numbers, strictly ascending.
+    /// Numbers of these Gaussians, strictly ascending.
     pub gaussians: Vec<u32>,
-    /// Their SH-rest rows, one after the other.
+    /// SH-rest rows of these Gaussians, one after the other.
     pub rows: Vec<f32>,
 }
 
@@ -194,7 +195,7 @@ pub struct SparseCodes {
     values: Values,
     escapes: Escapes,
     dim: usize,
-    /// Atoms of the dictionary they were made for.
+    /// Number of atoms of the dictionary that the codes were made for.
     atoms: usize,
 }
 
@@ -216,19 +217,19 @@ pub struct Column<'a> {
 }
 
 impl<'a> Column<'a> {
-    /// Number of nonzeros.
+    /// Returns the number of nonzeros.
     #[must_use]
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no nonzeros.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// The (atom, value) pairs, by ascending atom.
+    /// Returns the pairs (atom, value), by ascending atom.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (usize, f32)> + use<'a> {
         let codes = self.codes;
@@ -237,7 +238,7 @@ impl<'a> Column<'a> {
 }
 
 impl SparseCodes {
-    /// Checks all invariants and builds the offsets.
+    /// Creates codes, after it has checked all invariants.
     ///
     /// # Errors
     /// [`Error::Parameter`] that names the array and its first invalid entry.
@@ -251,8 +252,8 @@ impl SparseCodes {
         Self::part(dictionary, 0, counts, indices, values, escapes)
     }
 
-    /// [`Self::new`] for a part of a scene. Errors call the part's first Gaussian number `first`; escapes are numbered
-    /// from the part's start.
+    /// Creates codes as [`Self::new`] does, for a part of a scene. In errors, the part's first Gaussian has the number
+    /// `first`. Escapes are numbered from the start of the part.
     pub(crate) fn part(
         dictionary: &Dictionary,
         first: usize,
@@ -318,18 +319,18 @@ impl SparseCodes {
         Ok(Self { counts, checkpoints, indices, values, escapes, dim, atoms })
     }
 
-    /// Whether they were made for a dictionary of this size.
+    /// Returns whether the codes were made for a dictionary of this size.
     pub(crate) fn fit(&self, dictionary: &Dictionary) -> bool {
         (self.dim, self.atoms) == (dictionary.dim(), dictionary.len())
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         self.counts.len()
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.counts.is_empty()

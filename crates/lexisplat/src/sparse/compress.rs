@@ -19,18 +19,18 @@ use crate::support::parallel::{AT_ONCE, GAUSSIANS_PER_TASK, map_chunks};
 use crate::support::progress::{Progress, Stage};
 use crate::support::stopwatch::Stopwatch;
 
-/// The paper's main tolerance.
+/// Default tolerance, which is the paper's main one.
 pub const DEFAULT_TOLERANCE: f64 = 0.1;
 
-/// How to compress.
+/// Options of compression to an exact layout.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct CompressOptions {
-    /// Un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default [`DEFAULT_TOLERANCE`].
+    /// Un-squared L2 norm that the SH-rest error of no Gaussian exceeds. Default [`DEFAULT_TOLERANCE`].
     pub tolerance: Option<f64>,
     /// Largest number of nonzeros of a Gaussian. With it, `tolerance` is no longer promised.
     pub max_nonzeros: Option<u8>,
-    /// Atoms to learn; `None` for twice the dimension. Ignored when `dictionary` is given.
+    /// Number of atoms to learn; `None` for twice the dimension. Ignored if `dictionary` is given.
     pub atoms: Option<usize>,
     /// The pursuit. Default OLS.
     pub pursuit: Pursuit,
@@ -72,11 +72,11 @@ impl Default for CompressOptions {
     }
 }
 
-/// Compresses `splats`, which are consumed so that the geometry need not exist twice.
+/// Compresses `splats`. It is consumed, so that the geometry need not be in memory twice.
 ///
 /// # Errors
-/// [`Error::Parameter`] for options out of range, a dictionary of another degree, or a scene whose arrays
-/// differ in length or whose values are not finite; [`Error::Cancelled`].
+/// [`Error::Parameter`] if options are out of range, if the dictionary is of another degree, or if the arrays of the scene
+/// differ in length or have values that are not finite; [`Error::Cancelled`].
 pub fn compress(
     splats: Splats,
     options: &CompressOptions,
@@ -94,20 +94,20 @@ pub fn compress(
     Ok((Model::new(geometry, meta, dictionary, codes, record)?, report))
 }
 
-/// Codes the Gaussians of a range and appends them.
+/// A function that codes the Gaussians of a range and appends their codes.
 type CodePart<'a> = dyn FnMut(&Encoder, Range<usize>, &mut Coded) -> Result<()> + 'a;
 
-/// What [`encode`] made.
+/// The results of [`encode`].
 pub(crate) struct Encoded {
     pub(crate) dictionary: Dictionary,
-    /// All codes that `code_part` left.
+    /// The codes that `code_part` appended and did not clear.
     pub(crate) coded: Coded,
     pub(crate) record: Record,
     pub(crate) report: CompressReport,
 }
 
-/// Checks `options`, learns the dictionary from rows of `source`, and lets `code_part` code one range of
-/// Gaussians after the other. Each range but the last is of `at_once` Gaussians, a multiple of [`GAUSSIANS_PER_TASK`].
+/// Checks `options`, learns the dictionary from rows of `source`, and calls `code_part` for successive ranges of Gaussians.
+/// Each range but the last has `at_once` Gaussians, which must be a multiple of [`GAUSSIANS_PER_TASK`].
 pub(crate) fn encode(
     source: &dyn SplatSource,
     options: &CompressOptions,
@@ -141,7 +141,7 @@ pub(crate) fn encode(
     Ok(Encoded { dictionary: encoder.dictionary, coded, record, report })
 }
 
-/// A dictionary, and how to code with it.
+/// A dictionary, and the parameters of coding with it.
 pub(crate) struct Encoder {
     dictionary: Dictionary,
     coder: Option<Coder>,

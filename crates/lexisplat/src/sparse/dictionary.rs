@@ -14,7 +14,7 @@ pub struct Dictionary {
 }
 
 impl Dictionary {
-    /// A dictionary from `atoms`, stored one after the other, each `degree.rest()` long.
+    /// Creates a dictionary from `atoms`, which has the atoms one after the other, each of `degree.rest()` values.
     ///
     /// # Errors
     /// [`Error::Parameter`] if the length is not a whole number of atoms, if there are no atoms or more than
@@ -30,10 +30,10 @@ impl Dictionary {
         Ok(Self { degree, atoms: Atoms::checked(dim, atoms)? })
     }
 
-    /// A dictionary of `atoms`.
+    /// Creates a dictionary of `atoms`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if they are not `degree.rest()` long.
+    /// [`Error::Parameter`] if `atoms` do not have `degree.rest()` values each.
     pub fn of(degree: ShDegree, atoms: Atoms) -> Result<Self> {
         let dim = degree.rest();
         if atoms.dim() != dim {
@@ -43,36 +43,37 @@ impl Dictionary {
         Ok(Self { degree, atoms })
     }
 
-    /// The same as [`Self::new`] for atoms that were decoded, whose decoder says itself what is wrong.
+    /// Creates a dictionary of atoms that were decoded. `None` if [`Self::new`] would refuse them; the decoder reports the
+    /// error.
     pub(crate) fn decoded(degree: ShDegree, atoms: Vec<f32>) -> Option<Self> {
         Atoms::decoded(degree.rest(), atoms).map(|atoms| Self { degree, atoms })
     }
 
-    /// The dictionary of a scene without view dependence.
+    /// Creates the dictionary of a scene without view dependence.
     #[must_use]
     pub fn empty() -> Self {
         Self { degree: ShDegree::ZERO, atoms: Atoms::none() }
     }
 
-    /// SH degree of the vectors that the dictionary codes.
+    /// Returns the SH degree of the vectors that the dictionary codes.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
         self.degree
     }
 
-    /// Length of an atom: 0, 9, 24, 45 or 72.
+    /// Returns the length of an atom: 0, 9, 24, 45 or 72.
     #[must_use]
     pub fn dim(&self) -> usize {
         self.atoms.dim()
     }
 
-    /// Number of atoms.
+    /// Returns the number of atoms.
     #[must_use]
     pub fn len(&self) -> usize {
         self.atoms.len()
     }
 
-    /// Whether there are no atoms (degree 0).
+    /// Returns whether there are no atoms (degree 0).
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.atoms.is_empty()

@@ -18,49 +18,49 @@ pub struct Model {
     record: Record,
 }
 
-/// Which greedy pursuit chose the atoms.
+/// The greedy pursuit that chose the atoms of codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Pursuit {
-    /// Orthogonal matching pursuit: the atom most correlated with the residual (the paper's).
+    /// Orthogonal matching pursuit: takes the atom most correlated with the residual (the paper's).
     Omp,
-    /// Orthogonal least squares: the atom that lowers the residual most.
+    /// Orthogonal least squares: takes the atom that lowers the residual most.
     Ols,
 }
 
-/// How a [`Model`] was made and what it promises.
+/// The parameters with which a [`Model`] was made, and its errors.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Record {
-    /// Un-squared L2 norm of the SH-rest error. `None` if only `max_nonzeros` ended the pursuit.
+    /// Un-squared L2 norm that no SH-rest error exceeds. `None` if only `max_nonzeros` ended the pursuit.
     pub tolerance: Option<f64>,
-    /// Cap on nonzeros a Gaussian. With it the tolerance is no promise.
+    /// Largest number of nonzeros of a Gaussian. With it, `tolerance` is no promise.
     pub max_nonzeros: Option<u8>,
     /// The pursuit; `None` for packed scenes, whose atoms are chosen by the bits they cost.
     pub pursuit: Option<Pursuit>,
     /// Seed of the learning sample.
     pub seed: u64,
-    /// Largest error over all Gaussians, in f64 on the values `decompress` writes.
+    /// Largest error over all Gaussians, computed in f64 from the values that `decompress` writes.
     pub max_residual: f64,
     /// Root of the mean squared error over all Gaussians.
     pub rms_residual: f64,
-    /// Gaussians whose error is over `tolerance`; 0 unless `max_nonzeros` is set.
+    /// Number of Gaussians whose error is over `tolerance`; 0 unless `max_nonzeros` is set.
     pub over_tolerance: u64,
 }
 
-/// Digits of the errors of packed files after the first one, and half a step of a number that has the smallest first digit,
-/// as a share of it.
+/// Number of digits after the first one of errors in packed files. Half a unit of the last digit, as a share of a number
+/// with the first digit 1.
 const ERROR_DIGITS: usize = 4;
 const HALF_STEP: f64 = 0.5e-4;
 
 impl Record {
-    /// The same with errors of few digits. The largest error is not below the exact one, and within a tolerance that the
-    /// exact one keeps.
+    /// Rounds the errors to few digits. The largest error is not below the exact one. It is within the tolerance if the
+    /// exact one is.
     pub(crate) fn shortened(self) -> Self {
         let near = |x: f64| format!("{x:.ERROR_DIGITS$e}").parse().unwrap_or(x);
         let exact = self.max_residual;
         let mut most = near(exact);
         if most < exact {
-            // The next number of as many digits.
+            // The next larger number with as many digits.
             most = near(exact * (1.0 + HALF_STEP));
         }
         if most < exact {
@@ -76,7 +76,7 @@ impl Record {
 macro_rules! named {
     ($type:ident, $what:literal, $($variant:ident => $name:literal),+) => {
         impl $type {
-            /// Its name on the command line and in files.
+            /// Returns the name of the value on the command line and in files.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name),+ }
@@ -106,7 +106,7 @@ pub(crate) use named;
 named!(Pursuit, "pursuit", Omp => "omp", Ols => "ols");
 
 impl Model {
-    /// Puts a scene together from its parts.
+    /// Creates a model from its parts.
     ///
     /// # Errors
     /// [`Error::Parameter`] if the arrays of `geometry` differ in length, if there is not one column of codes for
@@ -130,14 +130,14 @@ impl Model {
         Ok(Self { geometry, meta, dictionary, codes, record })
     }
 
-    /// Everything but SH-rest. Readers of the exact layouts and [`compress()`](crate::compress()) give it exactly
-    /// as in the source.
+    /// Returns everything but SH-rest. It is exactly that of the source in models that a reader of the exact layouts or
+    /// [`compress()`](crate::compress()) made.
     #[must_use]
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
     }
 
-    /// Comments and marks of the source.
+    /// Returns the comments and marks of the source.
     #[must_use]
     pub fn meta(&self) -> &SceneMeta {
         &self.meta
@@ -149,57 +149,57 @@ impl Model {
         self.meta.offset = offset;
     }
 
-    /// The atoms.
+    /// Returns the dictionary.
     #[must_use]
     pub fn dictionary(&self) -> &Dictionary {
         &self.dictionary
     }
 
-    /// The codes, one column a Gaussian.
+    /// Returns the codes, one column a Gaussian.
     #[must_use]
     pub fn codes(&self) -> &SparseCodes {
         &self.codes
     }
 
-    /// How it was made and what it promises.
+    /// Returns the parameters with which the model was made, and its errors.
     #[must_use]
     pub fn record(&self) -> &Record {
         &self.record
     }
 
-    /// The parts that [`Self::new`] takes, in its order.
+    /// Returns the parts that [`Self::new`] takes, in its order.
     #[must_use]
     pub fn into_parts(self) -> (Geometry, SceneMeta, Dictionary, SparseCodes, Record) {
         (self.geometry, self.meta, self.dictionary, self.codes, self.record)
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         self.geometry.len()
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.geometry.is_empty()
     }
 
-    /// SH degree.
+    /// Returns the SH degree.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
         self.dictionary.degree()
     }
 
-    /// Bytes that all SH take in memory while drawing: codes, base colours, dictionary. A dense degree-3
-    /// scene takes 192 a Gaussian.
+    /// Returns the number of bytes that all SH take in memory while drawing: codes, base colours and dictionary. A dense
+    /// scene of degree 3 takes 192 bytes a Gaussian.
     #[must_use]
     pub fn resident_sh_bytes(&self) -> usize {
         let dictionary = self.dictionary.len() * self.dictionary.dim() * size_of::<f32>();
         self.codes.resident_bytes() + size_of_val(self.geometry.dc.as_slice()) + dictionary
     }
 
-    /// Dense SH-rest of every Gaussian, channel-major: the values `decompress` writes.
+    /// Returns the dense SH-rest of every Gaussian, channel-major: the values that `decompress` writes.
     #[must_use]
     pub fn dense_rest(&self) -> Vec<f32> {
         let dim = self.dictionary.dim();
@@ -214,7 +214,7 @@ impl Model {
         rest
     }
 
-    /// The dense scene.
+    /// Returns the dense scene.
     #[must_use]
     pub fn into_splats(self) -> Splats {
         let sh_rest = self.dense_rest();

@@ -1,4 +1,4 @@
-//! What coding counts, and the report that is made of it.
+//! Counts that are taken while coding, and the report that is made of them.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,28 +6,28 @@ use crate::packed::StreamBits;
 use crate::sparse::learn::Learned;
 use crate::sparse::model::Record;
 
-/// What compressing did, to an exact layout or to a packed scene.
+/// A report of compressing, to an exact layout or to a packed scene.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct CompressReport {
-    /// How learning went; `None` with a given dictionary and for packed scenes.
+    /// A report of learning; `None` with a given dictionary and for packed scenes.
     pub learned: Option<Learned>,
-    /// Mean nonzeros a Gaussian, an escape counting as a full vector.
+    /// Mean number of nonzeros of a Gaussian. An escape counts as a full vector.
     pub mean_nonzeros: f64,
-    /// Gaussians by number of nonzeros, from 0 to the dimension; escapes not among them.
+    /// Number of Gaussians by their number of nonzeros, from 0 to the dimension. Escapes are not counted.
     pub nonzero_histogram: Vec<u64>,
-    /// Gaussians whose SH are stored exactly.
+    /// Number of Gaussians whose SH-rest is stored exactly.
     pub escapes: u64,
     /// Seconds spent learning (0 where there is no clock, as in a browser).
     pub learn_seconds: f64,
-    /// Seconds spent coding and verifying; of packed scenes, on everything but learning.
+    /// Seconds spent coding and verifying; for packed scenes, seconds spent on everything but learning.
     pub code_seconds: f64,
-    /// Bits that each stream of a packed scene takes; empty for exact layouts.
+    /// Number of bits of each stream of a packed scene; empty for exact layouts.
     pub stream_bits: Vec<StreamBits>,
 }
 
 impl CompressReport {
-    /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` when nothing is coded.
+    /// Returns the paper's ratio: SH-rest coefficients over mean nonzeros. `None` if the mean is 0.
     #[must_use]
     pub fn coefficient_ratio(&self) -> Option<f64> {
         let dim = self.nonzero_histogram.len().saturating_sub(1);
@@ -35,10 +35,10 @@ impl CompressReport {
     }
 }
 
-/// What is counted while coding.
+/// Counts that are taken while coding.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Tally {
-    /// Gaussians by number of nonzeros; escapes not among them.
+    /// Number of Gaussians by their number of nonzeros. Escapes are not counted.
     pub(crate) histogram: Vec<u64>,
     pub(crate) escapes: u64,
     nonzeros: u64,
@@ -48,12 +48,12 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
-    /// Nothing yet of vectors of length `dim`.
+    /// Creates empty counts for vectors of length `dim`.
     pub(crate) fn new(dim: usize) -> Self {
         Self { histogram: vec![0; dim + 1], ..Self::default() }
     }
 
-    /// Counts a code with this many nonzeros and this error. `tolerance` is the error that it should not exceed.
+    /// Counts a code with `nonzeros` nonzeros and the error `error`. `tolerance` is the error that it should not exceed.
     pub(crate) fn code(&mut self, nonzeros: usize, error: f64, tolerance: Option<f64>) {
         self.histogram[nonzeros] += 1;
         self.nonzeros += nonzeros as u64;
@@ -62,7 +62,7 @@ impl Tally {
         self.over_tolerance += u64::from(tolerance.is_some_and(|t| error > t));
     }
 
-    /// Adds what was counted in the next part of the scene.
+    /// Adds the counts of the next part of the scene.
     pub(crate) fn add(&mut self, part: &Self) {
         self.histogram.iter_mut().zip(&part.histogram).for_each(|(a, b)| *a += b);
         self.escapes += part.escapes;
@@ -72,8 +72,8 @@ impl Tally {
         self.over_tolerance += part.over_tolerance;
     }
 
-    /// `record` with the errors, and the report, of `gaussians` Gaussians. `seconds` are those of learning and of
-    /// coding.
+    /// Returns `record` with the errors, and the report. `gaussians` is the number of Gaussians, and `seconds` are those of
+    /// learning and of coding.
     pub(crate) fn into_report(
         self,
         record: Record,

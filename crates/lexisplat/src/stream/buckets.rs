@@ -1,41 +1,41 @@
-//! Records distributed over buckets in temporary files, each of which fits in memory.
+//! Records that are distributed over buckets in temporary files. Each bucket fits in memory.
 
 use std::path::Path;
 
 use crate::support::error::Result;
 use crate::support::spill::{SpillTo, Temporary};
 
-/// Bytes a bucket collects before they are written.
+/// Number of bytes that a bucket collects before they are written.
 const BLOCK: usize = 1 << 16;
-/// Temporary files at most. Buckets share them, and a file is removed when its last bucket was taken.
+/// Largest number of temporary files. Buckets share files, and a file is removed when its last bucket is taken.
 const FILES: usize = 64;
 
-/// Records of one length in buckets. Within a bucket they stay in the order in which they came.
+/// Records of one length in buckets. Within a bucket they stay in the order in which they were pushed.
 #[derive(Debug)]
 pub(super) struct Buckets {
     files: Vec<Option<Temporary>>,
-    /// Buckets that share a file.
+    /// Number of buckets that share a file.
     shared: usize,
     buckets: Vec<Bucket>,
 }
 
 #[derive(Debug, Default, Clone)]
 struct Bucket {
-    /// Bytes not yet written.
+    /// Bytes that are not written yet.
     pending: Vec<u8>,
     /// Start and length of each block in the file.
     written: Vec<(u64, usize)>,
 }
 
 impl Buckets {
-    /// Makes `count` empty buckets with temporary files in `folder`.
+    /// Creates `count` empty buckets with temporary files in `folder`.
     pub(super) fn new(folder: &Path, count: usize) -> Result<Self> {
         let shared = count.div_ceil(FILES).max(1);
         let files = (0..count.div_ceil(shared)).map(|_| Temporary::new(SpillTo::Folder(folder)).map(Some));
         Ok(Self { files: files.collect::<Result<_>>()?, shared, buckets: vec![Bucket::default(); count] })
     }
 
-    /// Number of buckets.
+    /// Returns the number of buckets.
     pub(super) fn len(&self) -> usize {
         self.buckets.len()
     }
@@ -55,7 +55,7 @@ impl Buckets {
         Ok(())
     }
 
-    /// Removes and returns all records of bucket `bucket`. Buckets are taken in order.
+    /// Removes and returns all records of bucket `bucket`. Buckets must be taken in order.
     pub(super) fn take(&mut self, bucket: usize) -> Result<Vec<u8>> {
         let out = self.read(bucket)?;
         self.buckets[bucket] = Bucket::default();
@@ -65,7 +65,7 @@ impl Buckets {
         Ok(out)
     }
 
-    /// All records of bucket `bucket`.
+    /// Returns all records of bucket `bucket`, and keeps them.
     pub(super) fn read(&mut self, bucket: usize) -> Result<Vec<u8>> {
         let Bucket { pending, written } = &self.buckets[bucket];
         let mut out = vec![0; written.iter().map(|w| w.1).sum()];
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn records_come_back_bucket_by_bucket_in_order() {
         let folder = tempfile::tempdir().unwrap();
-        // More buckets than files, some of them larger than a block and some empty.
+        // There are more buckets than files. Some are larger than a block, and some are empty.
         let count = 3 * FILES - 1;
         let mut buckets = Buckets::new(folder.path(), count).unwrap();
         assert_eq!(buckets.len(), count);

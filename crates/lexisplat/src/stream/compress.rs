@@ -1,4 +1,4 @@
-//! The exact layouts, a part at a time.
+//! Compression to the exact layouts, a part of the scene at a time.
 
 use crate::formats::lexi::{CodeLayout, LexiWriter, SpilledModel, sh_bytes};
 use crate::scene::source::SplatSource;
@@ -13,43 +13,43 @@ use crate::support::sink::Sink;
 use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
 
-/// What [`compress`] did.
+/// The results of [`compress`].
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Compressed {
     /// Number of Gaussians.
     pub gaussians: usize,
-    /// The atoms.
+    /// The atoms of the file.
     pub dictionary: Dictionary,
-    /// How the scene was made and what is promised.
+    /// The parameters and the errors of the file.
     pub record: Record,
-    /// How learning and coding went.
+    /// A report of learning and coding.
     pub report: CompressReport,
-    /// Bytes of each tensor, and of the header under `header`, as [`LexiWriter::attribute_bytes`].
+    /// Number of bytes of each tensor, and of the header under the name `header`; see [`LexiWriter::attribute_bytes`].
     pub attribute_bytes: Vec<(String, u64)>,
-    /// Seconds spent writing the file after everything else.
+    /// Seconds spent on writing the file, after everything was coded.
     pub write_seconds: f64,
 }
 
 impl Compressed {
-    /// Size of the file.
+    /// Returns the number of bytes of the file.
     #[must_use]
     pub fn file_bytes(&self) -> u64 {
         self.attribute_bytes.iter().map(|a| a.1).sum()
     }
 
-    /// Bytes that stand for SH-rest, as [`LexiWriter::sh_bytes`].
+    /// Returns the number of bytes that stand for SH-rest; see [`LexiWriter::sh_bytes`].
     #[must_use]
     pub fn sh_bytes(&self) -> u64 {
         sh_bytes(&self.attribute_bytes)
     }
 }
 
-/// Compresses the scene of `source` and writes it to `sink`: the bytes that
-/// [`compress()`](crate::compress()) and [`LexiWriter::exact`] would make.
+/// Compresses the scene of `source` and writes it to `sink`. The bytes are those of [`compress()`](crate::compress()) and
+/// [`LexiWriter::exact`].
 ///
 /// # Errors
-/// As those two, [`crate::Error::Io`] also for temporary files.
+/// Those of these two functions, and [`crate::Error::Io`] for temporary files.
 pub fn compress<'a>(
     source: &dyn SplatSource,
     options: &CompressOptions,
@@ -60,7 +60,7 @@ pub fn compress<'a>(
     run(source, options, codes, sink.into(), AT_ONCE, progress)
 }
 
-/// `at_once` Gaussians are in memory at a time.
+/// Compresses as [`compress`] does, with `at_once` Gaussians in memory at a time.
 fn run(
     source: &dyn SplatSource,
     options: &CompressOptions,
@@ -94,7 +94,7 @@ mod tests {
     use crate::support::parallel::GAUSSIANS_PER_TASK;
     use crate::{Error, Extra, ExtraValues, Layout, Silent, Splats, ply};
 
-    /// More than two chunks, with normals, extras of several widths, and rows that no code reaches.
+    /// A scene of more than two chunks, with normals, extra properties of several widths, and rows that no code reaches.
     fn scene() -> Splats {
         let mut splats = crate::support::testing::scene(2 * GAUSSIANS_PER_TASK + 77, 3);
         let n = splats.len();
@@ -134,7 +134,7 @@ mod tests {
 
     type Options = (CompressOptions, CodeLayout);
 
-    /// Few atoms and a small sample: learning is not what is tested.
+    /// Options with few atoms and a small sample, since learning is not under test.
     fn quick(layout: Layout) -> Options {
         let options = CompressOptions::default().with_values(layout.values()).with_atoms(20).with_sample(500);
         (options, layout.codes())
@@ -164,7 +164,7 @@ mod tests {
         ply::write(&mut bytes, &splats).unwrap();
         let (options, codes) = quick(Layout::F16);
         let options = (options.with_max_nonzeros(3), codes);
-        // The only Gaussian with a normal is among those left out.
+        // The only Gaussian with a normal is left out.
         assert!(streamed(&bytes, &options, true, GAUSSIANS_PER_TASK) == in_memory(&bytes, &options, true));
     }
 

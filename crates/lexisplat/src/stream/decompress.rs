@@ -1,4 +1,4 @@
-//! From a .lexi file to a PLY, a part at a time.
+//! Conversion of a .lexi file to a PLY, a part at a time.
 
 use super::source_order::in_source_order;
 use crate::formats::lexi::LexiReader;
@@ -8,11 +8,11 @@ use crate::support::error::Result;
 use crate::support::progress::Progress;
 use crate::support::sink::Sink;
 
-/// Writes the dense scene of `lexi` as a PLY to `sink`: the bytes that [`lexi::read`](crate::formats::lexi::read)
-/// and [`ply::write`](crate::formats::ply::write()) would make. Returns their number.
+/// Writes the dense scene of `lexi` as a PLY to `sink`. The bytes are those of [`lexi::read`](crate::formats::lexi::read)
+/// and [`ply::write`](crate::formats::ply::write()). Returns their number.
 ///
 /// # Errors
-/// As those two; [`crate::Error::Io`] also for temporary files, which a packed file with its source's order
+/// Those of these two functions; [`crate::Error::Io`] for temporary files, which a packed file with its source's order
 /// needs; [`crate::Error::Cancelled`].
 pub fn decompress<'a>(
     lexi: &LexiReader<'_>,

@@ -1,10 +1,9 @@
-//! Scenes larger than memory, converted a part at a time.
+//! Conversion of scenes larger than memory, a part at a time.
 //!
-//! Scenes come from any [`SplatSource`] and results go to any [`Sink`](crate::Sink). The
-//! bytes are those of the functions that hold the whole scene, except for [`pack`]. Anonymous memory does not
-//! grow with the number of Gaussians. Temporary files are as large as the output, and when packing also as
-//! large as the input. They have no name, and lie in the folder of the output, or in the system's folder for
-//! temporary files if the output is no plain file.
+//! A scene comes from any [`SplatSource`], and a result goes to any [`Sink`](crate::Sink). The bytes are those of the
+//! functions that hold the whole scene, except for [`pack`]. Anonymous memory does not grow with the number of Gaussians.
+//! Temporary files are as large as the output, and for packing also as large as the input. They have no name. They lie in
+//! the folder of the output, or in the system's folder for temporary files if the output is no plain file.
 //!
 //! ```
 //! use lexisplat_sample::{SampleOptions, scene};
@@ -62,8 +61,8 @@ use crate::support::error::Result;
 use crate::support::parallel::AT_ONCE;
 use crate::support::progress::Progress;
 
-/// Reads Gaussians `rows` of `source` into `splats`, [`AT_ONCE`] of them at a time, and hands `take` the number of the first of
-/// them each time. Reports the bytes read to `progress`.
+/// Reads Gaussians `rows` of `source` into `splats`, [`AT_ONCE`] of them at a time. Calls `take` after each read, with the
+/// number of the first Gaussian that was read. Reports the bytes read to `progress`.
 pub(crate) fn each_part(
     source: &dyn SplatSource,
     rows: Range<usize>,

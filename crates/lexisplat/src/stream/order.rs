@@ -1,4 +1,4 @@
-//! Sorts Gaussians into the buckets of a packed file by way of temporary files.
+//! Sorting of Gaussians into the buckets of a packed file, through temporary files.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::scene::source::SplatSource;
 use crate::support::error::Result;
 use crate::support::progress::{Progress, Stage};
 
-/// Bytes of a record before the values: cell and number in the source.
+/// Number of bytes of a record before the values: the cell, and the number in the source.
 const KEY_BYTES: usize = 12;
 
 /// The Gaussians of a scene, by bucket.
@@ -57,7 +57,7 @@ impl Ordered {
         Ok(Self { rows, buckets })
     }
 
-    /// Bucket `number`, which is taken away if it is the `last` time. Then buckets are taken in order.
+    /// Returns bucket `number`. With `last`, the bucket is removed; such calls must be in the order of buckets.
     pub(super) fn bucket(&mut self, plan: &Plan, number: usize, last: bool) -> Result<Bucket> {
         let records = if last { self.buckets.take(number)? } else { self.buckets.read(number)? };
         let width = KEY_BYTES + self.rows.bytes();
@@ -80,7 +80,7 @@ impl Ordered {
     }
 }
 
-/// Begins to survey all `tiles` and to fill buckets, which reads them twice.
+/// Begins the stage of reading. Surveying `tiles` and filling buckets reads all of them twice.
 pub(super) fn begin_reading(tiles: &[&dyn SplatSource], progress: &dyn Progress) {
     let bytes: u64 = tiles.iter().map(|tile| tile.len() as u64 * tile.row_bytes()).sum();
     progress.begin(Stage::Read, 2 * bytes);

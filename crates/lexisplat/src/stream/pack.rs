@@ -1,4 +1,4 @@
-//! Layout packed: scenes of one bucket as a whole, others bucket by bucket.
+//! Packing of scenes: as a whole if they have one bucket, otherwise bucket by bucket.
 
 use super::observer::{Observed, Observer};
 use super::order::{Ordered, begin_reading, survey};
@@ -17,38 +17,39 @@ use crate::support::sink::Sink;
 use crate::support::spill::{SpillTo, Temporary};
 use crate::support::stopwatch::Stopwatch;
 
-/// What [`pack`] did.
+/// The results of [`pack`].
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct PackedFile {
-    /// Everything of the packed scene that is not as long as the scene.
+    /// The parts of the packed scene whose size does not depend on the number of Gaussians.
     pub head: PackedHead,
-    /// How packing went.
+    /// A report of the packing.
     pub report: CompressReport,
-    /// Bytes of each tensor and of the header, as [`LexiWriter::attribute_bytes`].
+    /// Number of bytes of each tensor and of the header; see [`LexiWriter::attribute_bytes`].
     pub tensor_bytes: Vec<(String, u64)>,
 }
 
 impl PackedFile {
-    /// Size of the file.
+    /// Returns the number of bytes of the file.
     #[must_use]
     pub fn file_bytes(&self) -> u64 {
         self.tensor_bytes.iter().map(|t| t.1).sum()
     }
 }
 
-/// Packs the scene of `source` so that pictures are about `decibels` good, and writes it to `sink`.
+/// Packs the scene of `source` so that its pictures have a PSNR of about `decibels` dB, and writes it to `sink`.
 ///
-/// A scene of at most [`BUCKET`] Gaussians is packed as a whole, as by [`Packer`]. Others are packed
-/// [bucket by bucket](crate::packed::tiles): `observer` draws each bucket, and steps, predictors and dictionary are found from
-/// sums over all of them. Without an observer, what shows is guessed from each Gaussian alone. The bytes are the same on any number of threads, and those that other
-/// processes make of the same tiles: the [parts](SplatSource::parts) of `source`. Peak of anonymous memory is below 1.5 GiB at SH
-/// degree 3.
+/// A scene of at most [`BUCKET`] Gaussians is packed as a whole, as by [`Packer`]. A larger scene is packed [bucket by
+/// bucket](crate::packed::tiles). `observer` draws each bucket, and steps, predictors and dictionary are found from sums
+/// over all buckets. Without an observer, the sensitivity is guessed from each Gaussian alone.
+///
+/// The bytes are the same on any number of threads. They are also those that other processes make of the same tiles, which
+/// are the [parts](SplatSource::parts) of `source`. Peak of anonymous memory is below 1.5 GiB at SH degree 3.
 ///
 /// # Errors
-/// [`Error::Parameter`] for options out of range, values so large that sums of them leave f32, and
-/// sensitivities that do not fit their part or are not finite; [`Error::Io`] for `sink` and for temporary
-/// files; [`Error::Cancelled`]; and what `observer` returns.
+/// [`Error::Parameter`] if options are out of range, if values are so large that sums of them leave f32, or if a
+/// sensitivity does not fit its part or is not finite. [`Error::Io`] for `sink` and for temporary files.
+/// [`Error::Cancelled`]. The errors of `observer`.
 pub fn pack<'a, E: From<Error>>(
     source: &dyn SplatSource,
     observer: Option<&mut dyn Observer<E>>,
@@ -60,7 +61,7 @@ pub fn pack<'a, E: From<Error>>(
     run(source, observer, options, decibels, sink.into(), BUCKET, progress)
 }
 
-/// [`pack`] with buckets of about `bucket` Gaussians.
+/// Packs as [`pack`] does, with buckets of about `bucket` Gaussians.
 pub(crate) fn run<E: From<Error>>(
     source: &dyn SplatSource,
     observer: Option<&mut dyn Observer<E>>,
@@ -193,10 +194,10 @@ fn in_buckets<E: From<Error>>(
     Ok(done)
 }
 
-/// A message of each bucket, in a temporary file.
+/// One message of each bucket, in a temporary file.
 struct Messages {
     file: Temporary,
-    /// Where each starts, and its length.
+    /// The start and the length of each message.
     places: Vec<(u64, usize)>,
 }
 
@@ -205,13 +206,13 @@ impl Messages {
         Ok(Self { file: Temporary::new(to)?, places: Vec::new() })
     }
 
-    /// Adds that of the next bucket.
+    /// Adds the message of the next bucket.
     fn push(&mut self, message: &[u8]) -> Result<()> {
         self.places.push((self.file.append(message)?, message.len()));
         Ok(())
     }
 
-    /// That of bucket `number`; empty if there is none.
+    /// Returns the message of bucket `number`; empty if there is none.
     fn read(&mut self, number: usize) -> Result<Vec<u8>> {
         let (start, length) = self.places.get(number).copied().unwrap_or_default();
         let mut message = vec![0; length];

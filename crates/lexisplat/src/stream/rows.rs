@@ -4,19 +4,19 @@ use crate::scene::extra::{Extra, for_extra};
 use crate::scene::splats::{Geometry, Splats};
 use crate::support::parallel::for_each_chunk_mut;
 
-/// Rows that one thread converts at a time.
+/// Number of rows that one thread converts at a time.
 const CHUNK_ROWS: usize = 1024;
 
-/// The layout of rows of scenes that are like a given one and have no normals: the values of each array one
-/// after the other, as they lie in memory.
+/// The layout of the rows of scenes with the properties of a given scene and without normals. A row has the Gaussian's
+/// values of each array one after the other, as they lie in memory.
 pub(crate) struct RowLayout {
     like: Splats,
-    /// Bytes of one Gaussian in each array.
+    /// Number of bytes of one Gaussian in each array.
     widths: Vec<usize>,
 }
 
 impl RowLayout {
-    /// The layout for scenes like `empty`, which has no Gaussians.
+    /// Creates the layout for scenes with the properties of `empty`, which has no Gaussians.
     pub(crate) fn new(empty: Splats) -> Self {
         let float = size_of::<f32>();
         let mut widths: Vec<usize> =
@@ -25,12 +25,12 @@ impl RowLayout {
         Self { like: empty, widths }
     }
 
-    /// Bytes of a row.
+    /// Returns the number of bytes of a row.
     pub(crate) fn bytes(&self) -> usize {
         self.widths.iter().sum()
     }
 
-    /// Replaces `rows` by the rows of `splats`, which is left as it is.
+    /// Replaces `rows` by the rows of `splats`. The values of `splats` do not change.
     pub(crate) fn pack(&self, splats: &mut Splats, rows: &mut Vec<u8>) {
         rows.clear();
         rows.resize(splats.len() * self.bytes(), 0);
@@ -47,7 +47,7 @@ impl RowLayout {
         });
     }
 
-    /// The Gaussians of `rows`.
+    /// Returns the Gaussians of `rows`.
     pub(crate) fn unpack(&self, rows: &[u8]) -> Splats {
         let n = rows.len() / self.bytes();
         let mut splats = self.like.clone();
@@ -58,7 +58,7 @@ impl RowLayout {
         }
         let mut offset = 0;
         for (column, &width) in columns(&mut splats).into_iter().zip(&self.widths) {
-            // Scenes of degree 0 have no SH-rest.
+            // Scenes of SH degree 0 have no SH-rest, so the width may be 0.
             for_each_chunk_mut(column, (width * CHUNK_ROWS).max(1), |chunk, values| {
                 let rows = rows[chunk * CHUNK_ROWS * self.bytes()..].chunks_exact(self.bytes());
                 for (value, row) in values.chunks_exact_mut(width).zip(rows) {
@@ -71,7 +71,7 @@ impl RowLayout {
     }
 }
 
-/// The bytes of every array in the order of a row.
+/// Returns the bytes of every array, in the order of a row.
 fn columns(splats: &mut Splats) -> Vec<&mut [u8]> {
     let g = &mut splats.geometry;
     let mut out: Vec<&mut [u8]> = vec![

@@ -11,19 +11,19 @@ use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
 use crate::support::error::Result;
 
-/// Gaussians of a bucket.
+/// Number of Gaussians of a bucket.
 const BUCKET: usize = 1 << 17;
-/// Places that are read at once: whole blocks of their column, so that each block is decoded once.
+/// Number of places that are read at once. They are whole blocks of their column, so each block is decoded once.
 const PLACES_AT_ONCE: usize = 1 << 16;
-/// Bytes of a Gaussian's place, before its values.
+/// Number of bytes of a Gaussian's place, which comes before its values.
 const PLACE_BYTES: usize = 4;
 
-/// Hands the dense scene of `lexi` to `take` part after part: in the order of its source if the file holds it,
-/// otherwise in the order of the file. Temporary files, if any are needed, are in `folder`.
+/// Calls `take` with the parts of the dense scene of `lexi`, one after the other. They are in the order of the source if
+/// the file holds it, otherwise in the order of the file. Temporary files, if any are needed, are in `folder`.
 ///
 /// # Errors
-/// [`crate::Error::Format`] for damage that only decoding finds, [`crate::Error::Io`] for temporary files, and
-/// what `take` returns.
+/// [`crate::Error::Format`] for damage that only decoding finds; [`crate::Error::Io`] for temporary files; the errors of
+/// `take`.
 pub fn in_source_order(
     lexi: &LexiReader<'_>,
     folder: &Path,
@@ -33,8 +33,8 @@ pub fn in_source_order(
     Ok(())
 }
 
-/// [`in_source_order`] that first shows every part to `see` as it is in the file. Returns the sizes of the
-/// streams of a packed file if `count_bits`.
+/// Does the same as [`in_source_order`], and calls `see` with every part as it is in the file. With `count_bits`, returns
+/// the number of bits of each stream of a packed file.
 pub(super) fn parts_and_source_order(
     lexi: &LexiReader<'_>,
     folder: &Path,
@@ -63,7 +63,7 @@ fn by_buckets(
     let rows = RowLayout::new(lexi.empty());
     let mut buckets = Buckets::new(folder, n.div_ceil(bucket_len))?;
     let mut bytes = Vec::new();
-    // Places of the next Gaussians, and how many were read so far.
+    // The places of the Gaussians to come, and the number of places that were read.
     let (mut places, mut read) = (Vec::new(), 0);
     let bits = lexi.parts(count_bits, &mut |_, model| {
         see(&model);
@@ -106,7 +106,7 @@ mod tests {
         let n = MOST_CHUNK + 1000;
         let mut splats = crate::support::testing::scene(n, 2);
         splats = splats.with_degree_cut(crate::ShDegree::new(1).unwrap());
-        // A name of one of the normals, which a PLY of ours otherwise has.
+        // A name of one of the normals, which a PLY that lexisplat writes otherwise has.
         let values = ExtraValues::U32((0..u32::try_from(n).unwrap()).collect());
         splats.geometry.extras = vec![Extra { name: "nx".into(), values }];
         let options = PackOptions { keep_order: true, atoms: Some(8), ..PackOptions::default() };

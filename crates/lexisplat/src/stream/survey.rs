@@ -18,24 +18,24 @@ use crate::support::progress::{Progress, Stage};
 pub struct Survey {
     /// Statistics of the dense scene.
     pub lint: Lint,
-    /// Nonzeros in all.
+    /// Number of nonzeros of all Gaussians.
     pub nonzeros: u64,
-    /// Gaussians stored exactly.
+    /// Number of Gaussians whose SH-rest is stored exactly.
     pub escapes: u64,
-    /// Gaussians by number of nonzeros, from 0 to the dimension, without escapes.
+    /// Number of Gaussians by their number of nonzeros, from 0 to the dimension. Escapes are not counted.
     pub nonzero_histogram: Vec<u64>,
-    /// Gaussians that use each atom.
+    /// Number of Gaussians that use each atom.
     pub atom_usage: Vec<u64>,
-    /// As [`Model::resident_sh_bytes`](crate::Model::resident_sh_bytes).
+    /// Number of bytes that all SH take in memory; see [`Model::resident_sh_bytes`](crate::Model::resident_sh_bytes).
     pub resident_sh_bytes: u64,
-    /// Sizes of the streams of a packed file; empty for other layouts.
+    /// Number of bits of each stream of a packed file; empty for other layouts.
     pub stream_bits: Vec<StreamBits>,
 }
 
-/// [`lint`](crate::scene::stats::lint()) of a scene that is read a part at a time.
+/// Computes [`lint`](crate::scene::stats::lint()) of a scene that is read a part at a time.
 ///
 /// # Errors
-/// As [`SplatSource::read`], and [`crate::Error::Cancelled`].
+/// Those of [`SplatSource::read`], and [`crate::Error::Cancelled`].
 pub fn lint(source: &dyn SplatSource, progress: &dyn Progress) -> Result<Lint> {
     let mut linter = Linter::default();
     let mut splats = source.empty();
@@ -46,10 +46,10 @@ pub fn lint(source: &dyn SplatSource, progress: &dyn Progress) -> Result<Lint> {
     Ok(linter.finish())
 }
 
-/// Decodes a .lexi file for its statistics. Temporary files, if any are needed, are in `folder`.
+/// Decodes a .lexi file and computes its statistics. Temporary files, if any are needed, are in `folder`.
 ///
 /// # Errors
-/// As [`in_source_order`](super::in_source_order).
+/// Those of [`in_source_order`](super::in_source_order).
 pub fn survey(lexi: &LexiReader<'_>, folder: &Path) -> Result<Survey> {
     let mut linter = Linter::default();
     linter.add(&lexi.empty())?;
@@ -77,7 +77,7 @@ pub fn survey(lexi: &LexiReader<'_>, folder: &Path) -> Result<Survey> {
             out.nonzero_histogram[0] -= escapes;
             (0..codes.nonzeros()).for_each(|k| out.atom_usage[codes.indices().get(k)] += 1);
             let base = size_of_val(model.geometry().dc.as_slice());
-            // Parts may end between two checkpoints.
+            // A part may end between two checkpoints, so those of the whole scene are counted above.
             let checkpoints = SparseCodes::checkpoint_bytes(model.len());
             out.resident_sh_bytes += (codes.resident_bytes() - checkpoints + base) as u64;
         },

@@ -1,4 +1,4 @@
-//! The dictionary in a file: learned atoms in whole numbers, and atoms that are the same in all files.
+//! The dictionary of a file: learned atoms as integers, and fixed atoms, which are the same in all files.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -7,29 +7,29 @@ use serde::{Deserialize, Serialize};
 use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, Bits, SignedBitModel};
 use crate::scene::sh::{CHANNELS, ShDegree};
 
-/// Grey, red against blue, and green against both: an orthonormal basis of colours.
+/// An orthonormal basis of colours: grey, red against blue, and green against both.
 const COLOURS: [[f64; CHANNELS]; CHANNELS] = [
     [0.577_350_269_189_625_7, 0.577_350_269_189_625_7, 0.577_350_269_189_625_7],
     [FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2],
     [0.408_248_290_463_863_1, -0.816_496_580_927_726_1, 0.408_248_290_463_863_1],
 ];
-/// Degrees of coefficients, and sizes of the numbers around, that are told apart.
+/// Number of SH degrees, and of sizes of neighbouring numbers, that have bit models of their own.
 const DEGREES: usize = 4;
 const SIZES: usize = 5;
-/// Largest whole number of an atom.
+/// Largest absolute value of an integer of an atom.
 const MOST: i32 = (1 << 15) - 1;
 
-/// Atoms of whole numbers, and whether those that are the same in all files follow.
+/// The learned atoms as integers, and whether the fixed atoms follow them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in crate::packed) struct WholeAtoms {
     degree: ShDegree,
-    /// Of each learned atom and each coefficient of a channel the numbers of the three [`COLOURS`].
+    /// For each learned atom and each coefficient of a channel, the numbers of the three [`COLOURS`].
     numbers: Vec<i32>,
     with_axes: bool,
 }
 
 impl WholeAtoms {
-    /// The atoms nearest to `rows`, in multiples of 2 to the power of minus `bits`.
+    /// Rounds the atoms `rows` to multiples of `2^-bits`.
     pub(in crate::packed) fn new(degree: ShDegree, rows: &[f32], bits: u32, with_axes: bool) -> Self {
         let per_channel = degree.rest_per_channel();
         let mut numbers = Vec::with_capacity(rows.len());
@@ -49,7 +49,7 @@ impl WholeAtoms {
         Self { degree, numbers, with_axes }
     }
 
-    /// Codes the numbers. The decoder gives none.
+    /// Codes the numbers of `learned` atoms. A decoder passes no numbers; the result has those that it decoded.
     fn code(&self, coder: &mut dyn Bits, learned: usize) -> Self {
         let per_channel = self.degree.rest_per_channel();
         let mut odds = [[[SignedBitModel::default(); SIZES]; CHANNELS]; DEGREES];
@@ -63,7 +63,8 @@ impl WholeAtoms {
                         let at = numbers.len().checked_sub(back).filter(|&at| at >= first);
                         at.and_then(|at| numbers.get(at)).map_or(0, |number| number.unsigned_abs())
                     };
-                    // The number before of the same colour, and that of grey of the same coefficient.
+                    // Sizes of the previous number of the same colour, and of the grey number of the same coefficient. Grey
+                    // numbers have no such second number and use the one before the previous instead.
                     let around =
                         size(CHANNELS) + if colour > 0 { size(colour) / 2 } else { size(2 * CHANNELS) };
                     let around = ((u32::BITS - around.leading_zeros()) as usize).min(SIZES - 1);
@@ -75,19 +76,19 @@ impl WholeAtoms {
         Self { numbers, ..self.clone() }
     }
 
-    /// The bytes of the learned atoms.
+    /// Returns the bytes of the learned atoms.
     pub(in crate::packed) fn write(&self) -> Vec<u8> {
         let mut encoder = BitEncoder::default();
         self.code(&mut encoder, self.learned());
         encoder.finish()
     }
 
-    /// Whether the atoms that are the same in all files follow.
+    /// Returns whether the fixed atoms follow the learned ones.
     pub(in crate::packed) fn with_axes(&self) -> bool {
         self.with_axes
     }
 
-    /// SH degree of the atoms.
+    /// Returns the SH degree of the atoms.
     pub(in crate::packed) fn degree(&self) -> ShDegree {
         self.degree
     }
@@ -96,7 +97,7 @@ impl WholeAtoms {
         self.numbers.len() / self.degree.rest().max(1)
     }
 
-    /// Reads what [`Self::write`] wrote of `learned` atoms; `None` for anything else.
+    /// Reads the bytes that [`Self::write`] wrote for `learned` atoms; `None` for all other bytes.
     pub(in crate::packed) fn read(
         bytes: &[u8],
         degree: ShDegree,
@@ -109,7 +110,7 @@ impl WholeAtoms {
         (within && read.write() == bytes).then_some(read)
     }
 
-    /// The atoms: unit-norm rows, channel by channel.
+    /// Returns the atoms as unit-norm rows, in channel-major order.
     pub(in crate::packed) fn rows(&self) -> Vec<f32> {
         let (dim, per_channel) = (self.degree.rest(), self.degree.rest_per_channel());
         let mut rows = Vec::with_capacity(self.numbers.len() + if self.with_axes { dim * dim } else { 0 });
@@ -123,7 +124,7 @@ impl WholeAtoms {
                 }
             }
             let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt();
-            // An atom of zeros cannot be used; the first axis stands in so that the rest can be read.
+            // No code can use an atom of zeros. The first axis replaces it, so that the other atoms can be read.
             if norm == 0.0 {
                 row[0] = 1.0;
             }
@@ -138,7 +139,7 @@ impl WholeAtoms {
     }
 }
 
-/// The atoms that are the same in all files: each coefficient alone, first in grey, then in the other colours.
+/// Returns the fixed atoms: each coefficient alone, first in grey, then in the other colours.
 pub(in crate::packed) fn axes(degree: ShDegree) -> Vec<f32> {
     let (dim, per_channel) = (degree.rest(), degree.rest_per_channel());
     let mut rows = vec![0.0; dim * dim];

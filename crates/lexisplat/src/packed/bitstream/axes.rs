@@ -1,16 +1,17 @@
-//! The axes of base colours: a turn, as four whole numbers.
+//! The axes of base colours, as a turn of four integers.
 
 use crate::support::maths::Vec3;
 
-/// Largest absolute value of the numbers of a turn.
+/// Largest absolute value of an integer of a turn.
 const MOST: f64 = i16::MAX as f64;
 
-/// The turn nearest to orthonormal `axes`, of which the third one may be reversed: a quaternion w, x, y, z of any length.
+/// Returns the turn nearest to orthonormal `axes`: a quaternion w, x, y, z of any length. The third axis may be reversed,
+/// since a turn has right-handed axes.
 pub(in crate::packed) fn turn_of(axes: &[Vec3; 3]) -> [i16; 4] {
     let mut m = axes.map(|axis| axis.map(f64::from));
     let [a, b, _] = m;
     m[2] = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    // Four times the squares of the numbers of the quaternion, of which the largest is taken for its precision.
+    // Four times the squares of the quaternion's numbers. The others are computed from the largest one, for precision.
     let squares = [
         1.0 + m[0][0] + m[1][1] + m[2][2],
         1.0 + m[0][0] - m[1][1] - m[2][2],
@@ -32,7 +33,7 @@ pub(in crate::packed) fn turn_of(axes: &[Vec3; 3]) -> [i16; 4] {
     if turn == [0; 4] { [i16::MAX, 0, 0, 0] } else { turn }
 }
 
-/// The axes of a turn. Every number is a whole one before one division. `None` for a turn of zeros.
+/// Returns the axes of a turn; `None` for a turn of zeros. All numbers are whole before the one division.
 pub(in crate::packed) fn axes_of(turn: [i16; 4]) -> Option<[Vec3; 3]> {
     let [w, x, y, z] = turn.map(f64::from);
     let length = w * w + x * x + y * y + z * z;
@@ -47,7 +48,7 @@ pub(in crate::packed) fn axes_of(turn: [i16; 4]) -> Option<[Vec3; 3]> {
     })
 }
 
-/// Axes as files hold them.
+/// Rounds axes to those that a file holds.
 pub(in crate::packed) fn rounded(axes: &[Vec3; 3]) -> [Vec3; 3] {
     axes_of(turn_of(axes)).unwrap_or(*axes)
 }

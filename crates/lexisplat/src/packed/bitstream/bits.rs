@@ -1,6 +1,6 @@
-//! Writing and reading bits.
+//! Writing and reading of bits.
 
-/// Collects bits, least significant first.
+/// A writer that collects bits in bytes, least significant bit first.
 #[derive(Debug, Default, Clone)]
 pub(in crate::packed) struct BitWriter {
     bytes: Vec<u8>,
@@ -29,11 +29,11 @@ impl BitWriter {
     }
 }
 
-/// Reads what a [`BitWriter`] wrote. Bits beyond the end are 0, and it is never [`Self::exhausted`] then.
+/// A reader of the bits of a [`BitWriter`]. Bits beyond the end are 0; a reader that took one is not [`Self::exhausted`].
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct BitReader<'a> {
     bytes: &'a [u8],
-    /// Next byte to take.
+    /// Index of the next byte to take.
     at: usize,
     held: u64,
     count: u32,
@@ -46,7 +46,7 @@ impl<'a> BitReader<'a> {
         Self { bytes, at: 0, held: 0, count: 0, missing: false }
     }
 
-    /// The next `count` bits, at most 64.
+    /// Returns the next `count` bits, at most 64.
     #[inline]
     pub(in crate::packed) fn take(&mut self, count: u32) -> u64 {
         if count > 32 {
@@ -66,7 +66,7 @@ impl<'a> BitReader<'a> {
         value
     }
 
-    /// Whether all bits were taken, except less than a byte of zeros, and none beyond the end.
+    /// Returns whether all bits were taken, except less than a byte of zeros, and none beyond the end.
     pub(in crate::packed) fn exhausted(&self) -> bool {
         !self.missing && self.at == self.bytes.len() && self.held == 0
     }

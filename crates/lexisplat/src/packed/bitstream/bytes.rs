@@ -1,6 +1,6 @@
 //! Little-endian numbers in a list of bytes.
 
-/// Takes numbers from the start of bytes. Every method returns `None` where too few bytes are left.
+/// A reader that takes numbers from the start of a list of bytes. Every method returns `None` if too few bytes are left.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::packed) struct ByteReader<'a>(pub(in crate::packed) &'a [u8]);
 
@@ -29,7 +29,7 @@ impl<'a> ByteReader<'a> {
         self.array().map(u32::from_le_bytes)
     }
 
-    /// What [`put_number`] wrote.
+    /// Takes an integer that [`put_number`] wrote.
     pub(in crate::packed) fn number(&mut self) -> Option<u64> {
         let mut number = 0_u64;
         for shift in (0..).step_by(7) {
@@ -38,31 +38,31 @@ impl<'a> ByteReader<'a> {
             let placed = bits.checked_shl(shift).filter(|placed| placed >> shift == bits)?;
             number |= placed;
             if byte < 0x80 {
-                // A last byte of zeros would be another way to write the same number.
+                // A last byte of zeros would be a second form of the same number.
                 return (byte > 0 || shift == 0).then_some(number);
             }
         }
         None
     }
 
-    /// A [number](Self::number) of 32 bits.
+    /// Takes an integer of up to 32 bits that [`put_number`] wrote.
     pub(in crate::packed) fn number32(&mut self) -> Option<u32> {
         self.number().and_then(|number| u32::try_from(number).ok())
     }
 
-    /// A finite number of the `N` high bytes of an f32.
+    /// Takes the `N` high bytes of a finite f32, whose other bytes are 0.
     pub(in crate::packed) fn short<const N: usize>(&mut self) -> Option<f32> {
         let mut bytes = [0; 4];
         bytes.get_mut(4 - N..)?.copy_from_slice(&self.array::<N>()?);
         Some(f32::from_le_bytes(bytes)).filter(|x| x.is_finite())
     }
 
-    /// A finite number.
+    /// Takes a finite f32.
     pub(in crate::packed) fn f32(&mut self) -> Option<f32> {
         self.array().map(f32::from_le_bytes).filter(|x| x.is_finite())
     }
 
-    /// Whole numbers of 16 bits.
+    /// Takes `N` integers of 16 bits.
     pub(in crate::packed) fn i16s<const N: usize>(&mut self) -> Option<[i16; N]> {
         let mut out = [0; N];
         for value in &mut out {
@@ -71,7 +71,7 @@ impl<'a> ByteReader<'a> {
         Some(out)
     }
 
-    /// Finite numbers.
+    /// Takes `N` finite f32.
     pub(in crate::packed) fn f32s<const N: usize>(&mut self) -> Option<[f32; N]> {
         let mut out = [0.0; N];
         for value in &mut out {
@@ -81,7 +81,7 @@ impl<'a> ByteReader<'a> {
     }
 }
 
-/// Writes a whole number in groups of 7 bits, low ones first. All bytes but the last have their highest bit set.
+/// Writes an integer in groups of 7 bits, a byte each, low bits first. All bytes but the last have their highest bit set.
 pub(in crate::packed) fn put_number(out: &mut Vec<u8>, mut number: u64) {
     while number >= 0x80 {
         out.push(number.to_le_bytes()[0] | 0x80);
@@ -90,12 +90,12 @@ pub(in crate::packed) fn put_number(out: &mut Vec<u8>, mut number: u64) {
     out.push(number.to_le_bytes()[0]);
 }
 
-/// Writes the `N` high bytes of `x`, which is a [short](shortened) number.
+/// Writes the `N` high bytes of `x`, whose other bytes must be 0; see [`shortened`].
 pub(in crate::packed) fn put_short<const N: usize>(out: &mut Vec<u8>, x: f32) {
     out.extend(x.to_le_bytes().iter().skip(4 - N));
 }
 
-/// The number nearest to `x` of which all but the `N` high bytes are zero. It is finite if `x` is.
+/// Returns the number nearest to `x` of which all but the `N` high bytes are 0. It is finite if `x` is.
 pub(in crate::packed) fn shortened<const N: usize>(x: f32) -> f32 {
     let low = u32::BITS - 8 * N as u32;
     let cut = |bits: u32| f32::from_bits(bits >> low << low);

@@ -1,4 +1,4 @@
-//! Coding of a chunk: ranges of a base, refinements, nonzeros and interim changes, all in the same lanes.
+//! Coding of a chunk: its ranges are a base, refinements, parts of SH-rest and interim changes, all in the same lanes.
 
 use super::fill_in::{CHANGES, interim};
 use super::geometry_syntax::{GeometrySyntax, Group};
@@ -14,16 +14,16 @@ use crate::packed::entropy::symbols::{LANES, Lanes, has};
 use crate::packed::entropy::tables::Lookup;
 use crate::support::crc32;
 
-/// Gaussians of a lane, at least. A lane takes about 8 bytes of every range.
+/// Least number of Gaussians of a lane. A lane takes about 8 bytes of every range.
 const LEAST_OF_LANE: usize = 1024;
 
-/// Number of lanes of a chunk.
+/// Returns the number of lanes of a chunk.
 pub(in crate::packed) fn lanes(gaussians: usize) -> usize {
     (gaussians / LEAST_OF_LANE).clamp(1, LANES)
 }
 
-/// First Gaussian of each lane of a chunk, and the number of Gaussians. The first lanes have one more than the others
-/// where the number does not divide.
+/// Returns the index of the first Gaussian of each lane of a chunk, followed by the number of Gaussians. If the number does
+/// not divide by `lanes`, the first lanes have one Gaussian more than the others.
 pub(in crate::packed) fn starts(gaussians: usize, lanes: usize) -> [usize; LANES + 1] {
     std::array::from_fn(|l| {
         let l = l.min(lanes);
@@ -31,17 +31,17 @@ pub(in crate::packed) fn starts(gaussians: usize, lanes: usize) -> [usize; LANES
     })
 }
 
-/// The sets of lanes that have a first, second, ... Gaussian.
+/// Returns for each step of a chunk the set of lanes that still have a Gaussian.
 pub(in crate::packed) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
     let whole = (1 << lanes) - 1;
     let last = (1 << (gaussians % lanes)) - 1;
     std::iter::repeat_n(whole, gaussians / lanes).chain((last > 0).then_some(last))
 }
 
-/// Takes what a chunk decodes to. A trait and not closures, since closures are not inlined into vector code.
+/// A receiver of the decoded Gaussians of a chunk. It is a trait, since closures are not inlined into vector code.
 pub(in crate::packed) trait Sink {
-    /// Takes one Gaussian of each lane in `set`: of each lane the one with this number, which is number `in_block` of its
-    /// block. `levels` are those of the chunk, and those that are missing. Returns `None` for what no encoder writes.
+    /// Takes Gaussian `number` of each lane in `set`. It has the index `in_block` in its block. `levels` are the number of
+    /// refinements of the chunk, and of those that are missing. Returns `None` for values that no encoder writes.
     fn group(
         &mut self,
         number: usize,
@@ -51,42 +51,42 @@ pub(in crate::packed) trait Sink {
         levels: [usize; 2],
     ) -> Option<()>;
 
-    /// Takes the SH-rest of a block of Gaussians, of each lane those from this number on.
+    /// Takes the SH-rest of a block of Gaussians. The block begins with Gaussian `number` of each lane.
     fn rest(&mut self, number: usize, rest: &Rest) -> Option<()>;
 }
 
-/// How the chunks of a file are coded.
+/// The parameters with which the chunks of a file are coded.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Form {
     pub(in crate::packed) steering: Steering,
     pub(in crate::packed) rest: RestForm,
 }
 
-/// How the chunks of a layer are coded.
+/// The kinds of ranges that the chunks of a layer have.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(in crate::packed) struct LayerForm {
-    /// Levels of refinement.
+    /// Number of refinements.
     pub(in crate::packed) levels: usize,
-    /// Parts of nonzeros.
+    /// Number of parts of SH-rest.
     pub(in crate::packed) parts: usize,
-    /// Whether there are interim changes.
+    /// Whether chunks have a range of interim changes.
     pub(in crate::packed) interim: bool,
 }
 
 impl LayerForm {
-    /// Number of ranges of a chunk: a base, the levels of refinement, parts of nonzeros, and interim changes.
+    /// Returns the number of ranges of a chunk: a base, refinements, parts of SH-rest, and interim changes.
     pub(in crate::packed) fn ranges(self) -> usize {
         self.interim_range() + usize::from(self.interim)
     }
 
-    /// The range of interim changes, if there are any.
+    /// Returns the index of the range of interim changes, if chunks have one.
     pub(in crate::packed) fn interim_range(self) -> usize {
         1 + self.levels + self.parts
     }
 }
 
 impl Form {
-    /// Codes the Gaussians of a chunk with `levels` levels of refinement. `None` if there is something no decoder takes.
+    /// Records the symbols of the Gaussians of a chunk of a layer. `None` for values that no decoder accepts.
     pub(in crate::packed) fn record(
         &self,
         frame: &Frame,
@@ -143,8 +143,9 @@ impl Form {
         Some(CodedChunk { gaussians: coded.len(), cell, bounds: bounds.0, energy, ranges })
     }
 
-    /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: refinements and parts that follow one that
-    /// is missing are not looked at. Hands everything to `sink`. `None` if no encoder writes this.
+    /// Decodes a chunk of `gaussians` Gaussians from the ranges that are there, and hands the Gaussians to `sink`.
+    /// Refinements after a missing refinement are ignored, and so are parts after a missing part. `None` if the base is
+    /// missing or the ranges are not the output of an encoder.
     #[inline(always)]
     pub(in crate::packed) fn decode(
         &self,
@@ -176,7 +177,7 @@ impl Form {
         let steps = gaussians.div_ceil(lanes);
         let mut sums = vec![Sums::default(); if want.sums { layer.ranges() } else { 0 }];
         let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, levels), Rest::default());
-        // Groups are large, so all are made in one place.
+        // A group is large, so one is reused for all steps.
         let mut group = Group::default();
         for (step, set) in sets(gaussians, lanes).enumerate() {
             walk.base(&mut base, set, None, &mut group)?;
@@ -204,7 +205,8 @@ impl Form {
                         sums[1 + levels + part].rest(&rest, &self.rest, part);
                     }
                 }
-                // Symbols of damaged files may take no bytes, so they are looked after before anything is made of them.
+                // Symbols of damaged files may take no bytes, so the decoders are checked before anything is made of the
+                // symbols.
                 let all = || std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
                 if !all().all(SymbolDecoder::good) {
                     return None;
@@ -222,25 +224,25 @@ impl Form {
     }
 }
 
-/// A coded chunk.
+/// A chunk whose symbols are recorded.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct CodedChunk {
     pub(in crate::packed) gaussians: usize,
-    /// The number of the first of its cells.
+    /// The number of the cell of its first Gaussian.
     pub(in crate::packed) cell: u64,
-    /// Least and largest coordinates of its positions.
+    /// Least and largest coordinates of the positions of its Gaussians.
     pub(in crate::packed) bounds: [[f32; 3]; 2],
-    /// Sum of the changes of pictures without each of its Gaussians.
+    /// The sum of the energies of its Gaussians: squared changes of pictures without each of them.
     pub(in crate::packed) energy: f64,
-    /// What its ranges hold, and the checksums of their integers.
+    /// The symbols of each range, and the checksum of its integers.
     pub(in crate::packed) ranges: Vec<(SymbolRecorder, u32)>,
 }
 
-/// Least and largest coordinates.
+/// Least and largest coordinates of positions.
 struct Extent([[f32; 3]; 2]);
 
 impl Extent {
-    /// Includes the positions of the lanes in `set`. `None` if there is something no decoder takes.
+    /// Extends to the positions of the lanes in `set`. `None` for values that no decoder accepts.
     fn add(&mut self, set: u32, group: &Group, frame: &Frame, levels: usize) -> Option<()> {
         let drawn = Drawn::new(frame, group, [levels, 0], &[false; LANES]);
         let [least, most] = &mut self.0;
@@ -254,23 +256,23 @@ impl Extent {
     }
 }
 
-/// What to find out while a chunk is decoded.
+/// The optional results of decoding a chunk.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::packed) struct Want {
-    /// Checksums of the integers of its ranges.
+    /// Whether to compute the checksums of the integers of the ranges.
     pub(in crate::packed) sums: bool,
-    /// Bits of its streams.
+    /// Whether to count the bits of the streams.
     pub(in crate::packed) bits: bool,
 }
 
-/// What was found out.
+/// The optional results of decoding a chunk, where they were wanted.
 #[derive(Debug, Default)]
 pub(in crate::packed) struct Played {
     pub(in crate::packed) sums: Vec<u32>,
     pub(in crate::packed) bits: BitCounts,
 }
 
-/// CRC-32 of the integers of a range, as i32, Gaussian by Gaussian.
+/// CRC-32 of the integers of a range, as i32. The Gaussians of a lane follow one another, and so do the lanes.
 #[derive(Debug, Clone, Default)]
 struct Sums(Lanes<crc32::Hasher>);
 
@@ -282,7 +284,7 @@ impl Sums {
         }
     }
 
-    /// Cell, classes, coarse steps, codes of the rotation.
+    /// Adds the integers of a base: cell, classes, numbers of coarse steps, codes of the rotation.
     fn base(&mut self, set: u32, group: &Group) {
         for l in (0..LANES).filter(|&l| has(set, l)) {
             self.add(l, &group.cell.map(|x| x[l]));
@@ -295,18 +297,19 @@ impl Sums {
         (0..LANES).filter(|&l| has(set, l)).for_each(|l| self.refined_of(l, group));
     }
 
-    /// Steps so far, codes of the rotation so far.
+    /// Adds the numbers of steps and the codes of the rotation, as far as they are refined.
     fn refined_of(&mut self, l: usize, group: &Group) {
         self.add(l, &group.counts.map(|x| x[l]));
         self.add(l, &group.rotation.map(|x| x[l].cast_signed()));
     }
 
-    /// Interim changes.
+    /// Adds the interim changes, in steps.
     fn interim(&mut self, set: u32, group: &Group) {
         (0..LANES).filter(|&l| has(set, l)).for_each(|l| self.add(l, &group.interim.map(|x| x[l])));
     }
 
-    /// Number of nonzeros, atoms with values; -1 and the bits of an exact row.
+    /// Adds each Gaussian's number of nonzeros, and the atom and the value of each. For an exact row, adds -1 and the bits
+    /// of the row.
     fn rest(&mut self, rest: &Rest, form: &RestForm, part: usize) {
         for l in 0..LANES {
             let mut cursor = Cursor::default();

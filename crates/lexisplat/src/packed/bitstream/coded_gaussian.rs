@@ -1,35 +1,37 @@
-//! A Gaussian as the encoder hands it to the syntax: integers and the values that they are made of.
+//! The values of a Gaussian that the encoder codes.
 
 use crate::packed::bitstream::fill_in::CHANGES;
 use crate::packed::bitstream::parameters::TARGETS;
 use crate::packed::bitstream::values::{across, main_axis};
 use crate::support::maths::{Vec3, atan2, dot, square_of_axis};
 
-/// A Gaussian to be coded.
+/// A Gaussian as the encoder codes it.
 #[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct CodedGaussian {
-    /// Number of its cell on the Morton curve. It is not below that of the Gaussian before it in its lane.
+    /// Number of its cell on the Morton curve. It is at least that of the previous Gaussian in its lane.
     pub(in crate::packed) cell: u64,
-    /// Colour and shape class.
+    /// The colour class and the shape class.
     pub(in crate::packed) classes: [u8; 2],
-    /// Logarithms of the scales, that of the opacity, and the coordinates of the base colour, as values.
+    /// The logarithms of the scales and of the opacity, and the coordinates of the base colour, as multiples of
+    /// `2^-VALUE_BITS`.
     pub(in crate::packed) values: [i32; TARGETS],
     /// Its axes, longest first, right-handed.
     pub(in crate::packed) axes: [Vec3; 3],
-    /// Position from the centre of its cell.
+    /// Position relative to the centre of the cell, in world units.
     pub(in crate::packed) offset: [f64; 3],
-    /// Pairs (atom, value in steps) with values that are not zero, largest first.
+    /// Pairs `(atom, value)` with values in steps that are not 0, largest first.
     pub(in crate::packed) code: Vec<(u16, i32)>,
-    /// The change of pictures without it.
+    /// The squared change of pictures without the Gaussian.
     pub(in crate::packed) energy: f32,
-    /// Steps of its interim changes.
+    /// The interim changes, in steps.
     pub(in crate::packed) interim: [i32; CHANGES],
-    /// The exact row, if it has no code; otherwise empty.
+    /// The exact SH-rest row if the Gaussian has no code; otherwise empty.
     pub(in crate::packed) exact: Vec<f32>,
 }
 
 impl CodedGaussian {
-    /// The codes of its rotation in full.
+    /// Returns the codes of the rotation with all bits: the two coordinates of the main axis with `direction` bits each,
+    /// and the turn about it with `turn` bits. The main axis is the longest one of a `needle`, otherwise the shortest one.
     pub(in crate::packed) fn rotation_codes(&self, [direction, turn]: [u32; 2], needle: bool) -> [u32; 3] {
         let (main, other) = if needle { (0, 1) } else { (2, 0) };
         let cell = |x: f32, bits: u32| -> u32 {

@@ -1,32 +1,32 @@
-//! Changes of Gaussians while those of the next layer around them are not there.
+//! Interim changes: changes of Gaussians while the next layer around them is missing.
 //!
-//! The Gaussians of a first layer stand apart. Until the next layer fills the space between them they are drawn larger,
-//! more or less opaque, and in the colour of what is missing around them.
+//! The Gaussians of the first layer lie apart. Until the next layer fills the space between them, they are drawn larger,
+//! more or less opaque, and in the colour of the Gaussians that are missing around them.
 
 use super::geometry_syntax::{DC, Group, OPACITY};
 use super::streams::Stream;
 use crate::packed::bitstream::parameters::TARGETS;
 use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
 
-/// Values that change: all scales alike, the opacity, and the coordinates of the base colour.
+/// Number of values with a change: one for all three scales, the opacity, and the coordinates of the base colour.
 pub(in crate::packed) const CHANGES: usize = 5;
-/// Kinds of changes, which have a step each: of scales, opacities and base colours.
+/// Number of kinds of changes, each with a step of its own: of scales, of opacities and of base colours.
 pub(in crate::packed) const KINDS: usize = 3;
-/// Largest step. Values have limits that are less than two of them apart.
+/// Largest step of a change. The limits of values are less than two of these steps apart.
 pub(in crate::packed) const MOST_STEP: u32 = 1 << 26;
-/// Classes of a context.
+/// Number of classes that share a context, and number of such groups of classes.
 const CLASS_WIDTH: u32 = 2;
 const CLASSES: u32 = 8;
-/// Changes of scales that contexts of opacities tell apart.
+/// Number of sizes of the change of scales that have contexts of their own when the change of the opacity is coded.
 const SCALES: u32 = 3;
 
-/// The kind of a change.
+/// Returns the kind of a change.
 #[inline(always)]
 fn kind(change: usize) -> usize {
     change.min(KINDS - 1)
 }
 
-/// Codes the changes of a group. `wanted` are those that the encoder codes.
+/// Codes the interim changes of a group. `wanted` holds the changes that an encoder codes; a decoder ignores it.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(in crate::packed) fn interim<S: Symbols>(
@@ -48,7 +48,7 @@ pub(in crate::packed) fn interim<S: Symbols>(
     }
 }
 
-/// Adds the changes to values where `alone`.
+/// Adds the interim changes to `values` in the lanes where `alone` is true.
 #[inline(always)]
 pub(in crate::packed) fn change(
     values: &mut [Lanes; TARGETS],
@@ -57,7 +57,7 @@ pub(in crate::packed) fn change(
     alone: &Lanes<bool>,
 ) {
     for (t, values) in values.iter_mut().enumerate() {
-        // The three scales change alike.
+        // One change is for all three scales.
         let k = (t + 1).saturating_sub(OPACITY);
         let step = steps[kind(k)].cast_signed();
         for l in 0..LANES {

@@ -1,7 +1,7 @@
-//! The walk over the Gaussians of a chunk, all lanes at a time, which encoder and decoder share.
+//! The walk over the Gaussians of a chunk, all lanes at a time. Encoder and decoder share it.
 //!
-//! Every value is coded as the difference from a prediction, in units of a step. Prediction and step are made of coarse
-//! integers alone that the same range holds before, so finer ranges may be missing.
+//! Every value is coded as its difference from a prediction, in units of a step. The prediction and the step depend only on
+//! coarse integers that come earlier in the same range. So refinements may be missing.
 
 use super::fill_in::CHANGES;
 use super::integer_model::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
@@ -13,33 +13,33 @@ use crate::packed::bitstream::morton;
 use crate::packed::bitstream::parameters::{LAST_CLASS, TARGETS};
 use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
 
-/// Streams of the coded of predictions.
+/// The stream of each predicted value.
 const TARGET_STREAMS: [Stream; TARGETS] =
     [Stream::Scale0, Stream::Scale1, Stream::Scale2, Stream::Opacity, Stream::Dc0, Stream::Dc1, Stream::Dc2];
 const POSITION_STREAMS: [Stream; 3] = [Stream::Position0, Stream::Position1, Stream::Position2];
-/// Gaps with at least this many bits share a context.
+/// Number of bits of a gap from which on all gaps share a context.
 const GAP_CONTEXTS: u32 = 23;
-/// Places of the opacity and of the first base colour among the coded.
+/// Indices of the opacity and of the first coordinate of the base colour among the targets.
 pub(in crate::packed) const OPACITY: usize = 3;
 pub(in crate::packed) const DC: usize = 4;
-/// Averages that are not predicted: the colour class, and the shape class above it.
+/// Indices of the averages that are not predicted: of the colour class, and of the shape class minus the colour class.
 const COLOUR: usize = TARGETS;
 const SHAPE: usize = TARGETS + 1;
-/// Most levels of refinement.
+/// Largest number of refinements.
 pub(in crate::packed) const MAX_LEVELS: usize = 2;
-/// Bits that codes of rotations lack where this many levels are missing.
+/// Number of bits that codes of rotations lack, by the number of missing refinements.
 pub(in crate::packed) const DROPPED: [u32; MAX_LEVELS + 1] = [0, 2, 3];
-/// Values that finer levels refine: those of the coded and three moves.
+/// Number of values that refinements apply to: the targets and three moves. Scales and opacities are always coded in full.
 pub(in crate::packed) const REFINED: usize = TARGETS + 3;
-/// Coarse steps over fine ones at one level.
+/// Ratio of steps before and after one refinement.
 pub(in crate::packed) const FACTOR: i32 = 3;
 
-/// Coarse steps over the finest ones where this many levels are missing.
+/// Returns the ratio of coarse steps to the finest ones, if `levels` refinements are missing.
 pub(in crate::packed) fn factor(levels: usize) -> i32 {
     FACTOR.pow(levels as u32)
 }
 
-/// One Gaussian of each lane as integers.
+/// One Gaussian of each lane, as integers.
 #[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct Group {
     /// Number of the cell on the Morton curve, and its coordinates.
@@ -47,26 +47,27 @@ pub(in crate::packed) struct Group {
     pub(in crate::packed) cell: [Lanes; 3],
     pub(in crate::packed) colour: Lanes<u32>,
     pub(in crate::packed) shape: Lanes<u32>,
-    /// Values of the coded by coarse steps.
+    /// Values of the targets as the base has them, with coarse steps.
     pub(in crate::packed) coarse: [Lanes; TARGETS],
-    /// Steps of the coded.
+    /// Finest steps of the targets.
     pub(in crate::packed) steps: [Lanes; TARGETS],
-    /// Coarse steps of each value, of the coded and then of the moves, as the base has them.
+    /// Number of coarse steps of each value, of the targets and then of the moves, as the base has them.
     pub(in crate::packed) base: [Lanes; REFINED],
-    /// The same, refined as far as it is known.
+    /// The same numbers of steps, as far as they are refined.
     pub(in crate::packed) counts: [Lanes; REFINED],
-    /// The codes of the rotation as far as they are known, and the bits of their coordinates and of the turn in full.
+    /// Codes of the rotation as far as they are refined. Then the full number of bits of each coordinate of the main axis,
+    /// and of the turn about it.
     pub(in crate::packed) rotation: [Lanes<u32>; 3],
     pub(in crate::packed) axis_bits: [Lanes<u32>; 2],
     pub(in crate::packed) needle: Lanes<bool>,
-    /// Logarithms of the steps of moves.
+    /// Logarithms of the steps of moves, in 512ths of an octave.
     pub(in crate::packed) moves: [Lanes; 3],
-    /// Contexts of moves.
+    /// Contexts of the moves.
     pub(in crate::packed) fineness: [Lanes<u32>; 3],
-    /// What the encoder codes in the end: whole numbers of finest steps, and codes of rotations in full.
+    /// Values that the encoder codes: numbers of finest steps, and full codes of rotations.
     pub(in crate::packed) wanted: [Lanes; REFINED],
     pub(in crate::packed) wanted_rotation: [Lanes<u32>; 3],
-    /// Steps of the changes while the next layer is not there: of the scales, the opacity and the base colour.
+    /// Steps of the interim changes: of the scales, the opacity and the base colour.
     pub(in crate::packed) interim: [Lanes; CHANGES],
 }
 
@@ -74,7 +75,7 @@ pub(in crate::packed) struct Group {
 #[derive(Debug)]
 pub(in crate::packed) struct GeometrySyntax<'a> {
     steering: &'a Steering,
-    /// Levels of refinement.
+    /// Number of refinements.
     levels: usize,
     around: NeighbourContext,
     cell: Lanes<u64>,
@@ -86,8 +87,8 @@ impl<'a> GeometrySyntax<'a> {
         Self { steering, levels, around: NeighbourContext::default(), cell: [0; LANES], gap_bits: [0; LANES] }
     }
 
-    /// Codes the base of the next Gaussian of each lane in `set` to `group`, which holds another or is new. Returns `None`
-    /// for impossible values, which only damaged files hold. Decoders pass no coded.
+    /// Codes the base of the next Gaussian of each lane in `set`, and stores it in `group`, which may hold an earlier
+    /// Gaussian. Returns `None` for impossible values, which only damaged files hold. A decoder passes no Gaussians.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(in crate::packed) fn base<S: Symbols>(
@@ -134,7 +135,7 @@ impl<'a> GeometrySyntax<'a> {
         (group.number, group.cell, group.colour, group.shape) = (self.cell, cell, colour, shape);
         let coarse = factor(self.levels);
         let mut remembered = [zeros; AVERAGED];
-        // All base colours have the same steps.
+        // All coordinates of a base colour have the same step.
         let colour_step = p.step(DC, &colour);
         for (t, stream) in TARGET_STREAMS.into_iter().enumerate() {
             features[0] = around[t];
@@ -145,7 +146,7 @@ impl<'a> GeometrySyntax<'a> {
                     let wanted = gaussian(l).map_or(0, |gaussian| gaussian.values[t]);
                     let steps =
                         |value: i32| (f64::from(value) - f64::from(predicted[l])) / f64::from(step[l]);
-                    // What is opaque stays so: values above the largest count as that.
+                    // An opaque Gaussian stays opaque: a value above the largest is coded as the largest, rounded up.
                     group.wanted[t][l] = match t == OPACITY && wanted >= MAX_LOG_OPACITY {
                         true => nearest(steps(MAX_LOG_OPACITY).ceil()),
                         false => nearest(steps(wanted)),
@@ -153,7 +154,8 @@ impl<'a> GeometrySyntax<'a> {
                 }
             }
             let wanted = group.wanted[t];
-            // The steps of turns and moves, and predictions, depend on scales and opacities.
+            // Scales and opacities have no coarse steps, because the steps of turns and moves, and predictions, depend on
+            // them.
             let coarse = if t < DC { 1 } else { coarse };
             let counts = s.signed(slot(stream), *class, set, |l| coarsened(wanted[l], coarse));
             for l in 0..LANES {
@@ -178,7 +180,7 @@ impl<'a> GeometrySyntax<'a> {
         Some(())
     }
 
-    /// Codes rotations and positions.
+    /// Codes the rotation and the position of a Gaussian of each lane.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn turns_and_moves<S: Symbols>(
@@ -229,14 +231,14 @@ impl<'a> GeometrySyntax<'a> {
     }
 }
 
-/// Bits that a code of `bits` bits lacks where `levels` levels are missing. One bit stays, so that every Gaussian takes
-/// some.
+/// Returns the number of bits that a code of `bits` bits lacks, if `levels` refinements are missing. At least one bit
+/// stays, so that every Gaussian takes bits.
 #[inline(always)]
 pub(in crate::packed) fn dropped(bits: u32, levels: usize) -> u32 {
     DROPPED[levels].min(bits.saturating_sub(1))
 }
 
-/// Colour and shape classes.
+/// Codes the colour class and the shape class.
 #[inline(always)]
 fn classes<S: Symbols>(
     s: &mut S,
@@ -256,7 +258,7 @@ fn classes<S: Symbols>(
     for l in 0..LANES {
         let own = (colour[l] << FEATURE_BITS).cast_signed();
         let expected = own.wrapping_add(around[SHAPE][l]).clamp(0, LAST << FEATURE_BITS);
-        // In halves, so that the context also says on which side of the rounded value the class may lie.
+        // The context is in half classes, so that it also says on which side of the rounded value the class may lie.
         let below = (expected - ONE / 4) >> FEATURE_BITS << FEATURE_BITS;
         context[l] = if known { 1 + level(2 * (expected - below)) } else { 0 };
         nearest[l] = level(expected);
@@ -273,20 +275,20 @@ fn classes<S: Symbols>(
     (!beyond).then_some([colour, shape])
 }
 
-/// Share of a step by which a difference must exceed the middle between two values to be rounded away from zero. The
-/// value nearer to zero takes fewer bits.
+/// Share of a step by which a difference must exceed the middle between two values to be rounded away from zero. The value
+/// nearer to zero takes fewer bits.
 const DEAD_ZONE: f64 = 0.08;
 /// Largest number of steps.
 const MAX_STEPS: f64 = 1e9;
 
-/// The whole number of steps that stands for `steps`.
+/// Rounds a number of steps to a whole number, towards zero within the dead zone.
 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
 pub(in crate::packed) fn nearest(steps: f64) -> i32 {
     let whole = (steps.abs().min(MAX_STEPS) + 0.5 - DEAD_ZONE).floor() as i32;
     if steps < 0.0 { -whole } else { whole }
 }
 
-/// The number of steps `coarse` times as large that is nearest to `whole` steps. `coarse` is odd.
+/// Returns the number of steps nearest to `whole` steps, if steps are `coarse` times as large. `coarse` must be odd.
 #[inline(always)]
 pub(in crate::packed) fn coarsened(whole: i32, coarse: i32) -> i32 {
     (whole + coarse / 2).div_euclid(coarse)

@@ -1,20 +1,20 @@
-//! Rounding to half precision in integers, since WebAssembly and many CPUs have no instructions for it.
+//! Rounding to half precision with integers. WebAssembly and many CPUs have no instructions for it.
 
 use half::f16;
 
-/// Bits of an f32 below those of an f16.
+/// Number of mantissa bits that an f32 has and an f16 has not.
 const CUT: u32 = f32::MANTISSA_DIGITS - f16::MANTISSA_DIGITS;
-/// The bits of 2^-14, below which numbers of half precision have fewer digits, and of 65,520, from which on they are
-/// infinite.
+/// The bits, as f32, of 2^-14 and of 65,520. Half precision has fewer digits for numbers below the first, and infinity from
+/// the second on.
 const LEAST: u32 = 113 << 23;
 const BEYOND: u32 = 0x477f_f000;
-/// What the exponents of a number in both precisions differ by.
+/// Difference between the exponents of a number in both precisions, at the place of the exponent of an f32.
 const REBIAS: u32 = 112 << 23;
-/// The bits of infinity in half precision, at the place of those of an f32.
+/// The bits of infinity in half precision, shifted to the place of those of an f32.
 const INFINITE: u32 = 0x7c00 << CUT;
 const SIGN: u32 = 1 << 31;
 
-/// `x` rounded to half precision, to the even number in the middle between two.
+/// Rounds `x` to half precision, and to the even number if it is in the middle between two.
 #[inline(always)]
 pub(in crate::packed) fn halved(x: f32) -> f16 {
     let (sign, size) = (x.to_bits() & SIGN, x.to_bits() & !SIGN);
@@ -25,7 +25,7 @@ pub(in crate::packed) fn halved(x: f32) -> f16 {
     f16::from_bits((sign >> 16 | (near - REBIAS) >> CUT) as u16)
 }
 
-/// A number of half precision as an f32.
+/// Returns a number of half precision as an f32.
 #[inline(always)]
 pub(in crate::packed) fn doubled(x: f16) -> f32 {
     let bits = u32::from(x.to_bits());
@@ -36,14 +36,14 @@ pub(in crate::packed) fn doubled(x: f16) -> f32 {
     f32::from_bits(sign | (size + REBIAS))
 }
 
-/// [`halved`] for numbers that hardly occur.
+/// Computes [`halved`] for numbers that hardly occur.
 #[cold]
 #[inline(never)]
 fn halved_by_library(x: f32) -> f16 {
     f16::from_f32(x)
 }
 
-/// [`doubled`] for numbers that hardly occur.
+/// Computes [`doubled`] for numbers that hardly occur.
 #[cold]
 #[inline(never)]
 fn doubled_by_library(x: f16) -> f32 {
@@ -58,7 +58,7 @@ mod tests {
         assert_eq!(halved(x).to_bits(), f16::from_f32(x).to_bits(), "{x:e}");
     }
 
-    /// All numbers of half precision, the middles between them, and what is next to both.
+    /// Tests all numbers of half precision, the middles between them, and the numbers next to both.
     #[test]
     fn numbers_are_rounded_as_the_library_does() {
         for bits in 0..=u16::MAX {

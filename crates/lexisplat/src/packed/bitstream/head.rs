@@ -1,4 +1,5 @@
-//! What the head of a file holds: how chunks are coded, what values are made with, tables, dictionary and index.
+//! The head of a file: the parameters of the coding of chunks and of their values, the tables, the dictionary and the
+//! index.
 
 use super::atoms::WholeAtoms;
 use super::axes::{axes_of, turn_of};
@@ -17,16 +18,16 @@ use crate::support::limits::MAX_ATOMS;
 
 /// Largest binary logarithm of the unit of base colours.
 const MAX_DC_EXPONENT: u8 = 100;
-/// Bits of the number of points of view, and where the two marks after the number of parts are.
+/// Number of bits of the number of points of view, and the place of the two flags after the number of parts.
 const POINTS_BITS: u32 = 4;
 const MARKS: u32 = 6;
-/// Bits of the binary logarithm of the unit of base colours, before the mark of interim changes.
+/// Number of bits of the binary logarithm of the unit of base colours. The flag of interim changes is the bit above.
 const EXPONENT_BITS: u32 = 7;
-/// Largest absolute value of a coordinate of a base colour, in units. Targets may be four times as large, since the
-/// largest of a scene may not be in the sample that is known.
+/// Largest absolute value of a coordinate of a base colour, in units. Values may be four times as large, since the largest
+/// coordinate of a scene may not be in the sample that sets the unit.
 const MOST_DC: f64 = 16.0;
 
-/// The number of atoms of a head.
+/// Returns the number of atoms that a head states.
 pub(crate) fn atoms_of_head(head: &[u8]) -> Option<u64> {
     ByteReader(head).number()
 }
@@ -34,29 +35,31 @@ pub(crate) fn atoms_of_head(head: &[u8]) -> Option<u64> {
 /// The head of a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Head {
-    /// Whether atoms that are the same in all files follow the learned ones.
+    /// Whether the fixed atoms follow the learned ones.
     pub(in crate::packed) with_axes: bool,
     /// Binary logarithm of the unit of base colours.
     pub(in crate::packed) dc_exponent: u8,
     pub(in crate::packed) rest: RestForm,
-    /// Steps of interim changes, if there are any, of scales, opacities and base colours.
+    /// Steps of the interim changes of scales, opacities and base colours; `None` without interim changes.
     pub(in crate::packed) interim: Option<[u32; KINDS]>,
     pub(in crate::packed) mean_view: MeanView,
     pub(in crate::packed) integers: Integers,
-    /// Its steps of values and its unit of base colours follow from the other fields.
+    /// The floats that values are made with. Its steps of SH values, its unit of base colours and its steps of interim
+    /// changes follow from the other fields.
     pub(in crate::packed) frame: Frame,
-    /// Step of the values of colour class 0, and of those of all classes if an error was promised. The other one is 0.
+    /// Step of SH values of colour class 0, and step of SH values of all classes if an error was promised. One of them is
+    /// 0.
     pub(in crate::packed) value_step: f32,
     pub(in crate::packed) promised: f32,
-    /// Probabilities of all symbols.
+    /// The bytes of the tables.
     pub(in crate::packed) tables: Vec<u8>,
-    /// The learned atoms.
+    /// The bytes of the learned atoms.
     pub(in crate::packed) dictionary: Vec<u8>,
     pub(in crate::packed) index: Index,
 }
 
 impl Head {
-    /// A head without tables and index.
+    /// Creates a head without tables and index.
     pub(in crate::packed) fn new(
         p: &Parameters,
         most_dc: f64,
@@ -90,7 +93,7 @@ impl Head {
         head
     }
 
-    /// The same with interim changes in these steps.
+    /// Adds interim changes with these steps, given as natural logarithms and SH coefficients.
     pub(in crate::packed) fn with_interim(mut self, [scale, opacity, colour]: [f64; KINDS]) -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
         let step =
@@ -100,24 +103,24 @@ impl Head {
         self
     }
 
-    /// The unit of base colours.
+    /// Returns the unit of base colours, a power of two.
     pub(in crate::packed) fn dc_unit(&self) -> f64 {
         f64::from_bits((1023 + u64::from(self.dc_exponent)) << 52)
     }
 
-    /// Fills the fields that follow from others.
+    /// Computes the fields that follow from others.
     fn complete(&mut self) {
         self.frame.dc_unit = f32::from_bits((127 + u32::from(self.dc_exponent)) << 23);
         let step = |class: usize| match self.promised > 0.0 {
             true => self.promised,
-            // 2 to the power of the class, which is at most 15.
+            // The factor is 2 to the power of the class, which is at most 15.
             false => self.value_step * f32::from_bits((127 + class as u32) << 23),
         };
         self.frame.interim = self.interim.unwrap_or_default();
         self.frame.value_steps = std::array::from_fn::<f32, { LAST_CLASS as usize + 1 }, _>(step);
     }
 
-    /// How chunks are coded.
+    /// Returns the parameters with which chunks are coded.
     pub(in crate::packed) fn form(&self) -> Form {
         Form { steering: Steering::new(&self.integers), rest: self.rest.clone() }
     }
@@ -130,7 +133,7 @@ impl Head {
         let marks = u8::from(is_promised) | u8::from(self.with_axes) << 1;
         out.push(points.len() as u8 | (parts.len() as u8) << POINTS_BITS | marks << MARKS);
         out.push(self.dc_exponent | u8::from(self.interim.is_some()) << EXPONENT_BITS);
-        // The last part ends with 1.
+        // The last part is left out, since its smallest size is always 1.
         out.extend(parts.iter().rev().skip(1).rev().map(|&least| least as u8));
         self.interim.iter().flatten().for_each(|&step| put_number(&mut out, step.into()));
         let f = &self.frame;
@@ -155,7 +158,7 @@ impl Head {
         out
     }
 
-    /// Reads what [`Self::write`] wrote, for rows of `dim` coefficients; `None` for anything else.
+    /// Reads the bytes that [`Self::write`] wrote, for rows of `dim` coefficients; `None` for all other bytes.
     pub(in crate::packed) fn read(bytes: &[u8], dim: usize) -> Option<Self> {
         let mut from = ByteReader(bytes);
         let atoms = from.number32()? as usize;
@@ -198,7 +201,7 @@ impl Head {
         for _ in 0..points {
             mean_view.points.push([from.short::<3>()?, from.short::<3>()?, from.short::<3>()?]);
         }
-        // Directions are divided by the softening where there is no distance.
+        // Directions are divided by the softening where a point has no distance, so it must be above 0.
         if cell <= 0.0 || step <= 0.0 || (points > 0 && mean_view.softening <= 0.0) {
             return None;
         }

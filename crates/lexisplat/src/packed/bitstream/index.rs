@@ -1,4 +1,4 @@
-//! The index of a file: its layers and their chunks, and the ranges of all chunks in the order of the data.
+//! The index of a file: its layers, their chunks, and the ranges of all chunks in the order of the data.
 
 use super::bytes::{ByteReader, put_number, put_short};
 use super::chunk::LayerForm;
@@ -6,17 +6,17 @@ use super::geometry_syntax::MAX_LEVELS;
 
 /// Most layers of a file.
 const MAX_LAYERS: usize = 8;
-/// Bits of the number of layers.
+/// Number of bits of the number of layers.
 const LAYERS_BITS: u32 = 7;
-/// Most Gaussians of a chunk. A decoder needs memory for as many.
+/// Most Gaussians of a chunk. A decoder needs memory for all of them.
 const MAX_CHUNK: usize = 1 << 16;
-/// A Gaussian takes at least this many bits of the base: one for each code of its rotation.
+/// Least number of bits that a Gaussian takes in the base: one for each of the three codes of its rotation.
 const LEAST_BITS: u64 = 3;
 
 /// A range of the data of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::packed) struct Range {
-    /// Where it starts in the data.
+    /// The place in the data where the range starts.
     pub(in crate::packed) start: u64,
     pub(in crate::packed) length: u32,
     /// CRC-32 of its bytes.
@@ -26,7 +26,7 @@ pub(in crate::packed) struct Range {
 }
 
 impl Range {
-    /// Where it ends in the data.
+    /// Returns the place in the data where the range ends.
     pub(in crate::packed) fn end(&self) -> u64 {
         self.start.saturating_add(self.length.into())
     }
@@ -36,20 +36,20 @@ impl Range {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Chunk {
     pub(in crate::packed) layer: usize,
-    /// Number of its first Gaussian in the file.
+    /// Index of its first Gaussian in the file.
     pub(in crate::packed) first: usize,
     pub(in crate::packed) gaussians: usize,
-    /// The number of the first of its cells. Those of the other Gaussians are not below it, and not above that of the next
-    /// chunk of the layer.
+    /// The number of the cell of its first Gaussian. The cells of its other Gaussians are not below it, and not above the
+    /// first cell of the next chunk of the layer.
     pub(in crate::packed) cell: u64,
-    /// Least and largest coordinates of its positions, or some beyond; zeros if it is the only chunk. No decoder needs
-    /// them.
+    /// Coordinates that are at most the least, and at least the largest, of its positions; zeros if it is the only chunk.
+    /// No decoder needs them.
     pub(in crate::packed) bounds: [[f32; 3]; 2],
-    /// A base, levels of refinement, parts of nonzeros, and interim changes.
+    /// The ranges by kind: the base, refinements, parts of SH-rest, and interim changes.
     pub(in crate::packed) ranges: Vec<Range>,
 }
 
-/// A range by the numbers of its chunk and of its kind.
+/// A range, by the index of its chunk and its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::packed) struct Place {
     pub(in crate::packed) chunk: u32,
@@ -60,13 +60,14 @@ pub(in crate::packed) struct Place {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Index {
     pub(in crate::packed) layers: Vec<LayerForm>,
-    /// Layer by layer.
+    /// All chunks, layer by layer.
     pub(in crate::packed) chunks: Vec<Chunk>,
     /// All ranges in the order of the data.
     pub(in crate::packed) order: Vec<Place>,
 }
 
-/// The layers with these levels of refinement.
+/// Returns the form of each layer. `levels` holds the number of refinements of each. All layers but the last have interim
+/// changes if `interim` is true.
 pub(in crate::packed) fn layer_forms(levels: &[u8], parts: usize, interim: bool) -> Vec<LayerForm> {
     let last = levels.len().saturating_sub(1);
     let form =
@@ -75,8 +76,9 @@ pub(in crate::packed) fn layer_forms(levels: &[u8], parts: usize, interim: bool)
 }
 
 impl Index {
-    /// Numbers the Gaussians, places the ranges of all chunks, and widens bounds of chunks to those that are written. `None` if
-    /// there are more Gaussians or bytes than memory counts, or if the order names a range that is not there.
+    /// Computes the first Gaussian of each chunk and the start of each range. Rounds the bounds of chunks outward to the
+    /// two bytes a number that a file holds. `None` if the Gaussians or the bytes are too many to count, or if the order
+    /// names a range that is not there.
     pub(in crate::packed) fn place(&mut self) -> Option<()> {
         let mut first = 0_usize;
         let is_one = self.chunks.len() == 1;
@@ -94,22 +96,22 @@ impl Index {
         Some(())
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub(in crate::packed) fn gaussians(&self) -> usize {
         self.chunks.last().map_or(0, |chunk| chunk.first + chunk.gaussians)
     }
 
-    /// Bytes of all ranges.
+    /// Returns the number of bytes of all ranges.
     pub(in crate::packed) fn data_bytes(&self) -> u64 {
         self.chunks.iter().flat_map(|chunk| &chunk.ranges).map(|range| u64::from(range.length)).sum()
     }
 
-    /// How the chunks of a layer are coded.
+    /// Returns the form of the chunks of a layer.
     pub(in crate::packed) fn layer(&self, layer: usize) -> LayerForm {
         self.layers.get(layer).copied().unwrap_or_default()
     }
 
-    /// Where the second layer starts in the data, if there is one.
+    /// Returns the place in the data where the second layer starts; `None` if there is one layer.
     pub(in crate::packed) fn first_layer_end(&self) -> Option<u64> {
         let second =
             |place: &&Place| self.chunks.get(place.chunk as usize).is_some_and(|chunk| chunk.layer > 0);
@@ -117,7 +119,8 @@ impl Index {
         self.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind)).map(|range| range.start)
     }
 
-    /// The cells of a layer around which the next one is not there, if it has interim changes. `there` says which ranges are.
+    /// Returns the cells where the base of the next layer is missing; none if `layer` has no interim changes. `there`
+    /// returns whether a range is there.
     pub(in crate::packed) fn alone(
         &self,
         layer: usize,
@@ -141,7 +144,8 @@ impl Index {
         alone
     }
 
-    /// The chunks of the next layer with cells of chunk `c` or next to them; none if the layer has no interim changes.
+    /// Returns the chunks of the next layer whose cells overlap those of chunk `c`, or may; none if the layer of `c` has no
+    /// interim changes.
     pub(in crate::packed) fn around(&self, c: usize) -> std::ops::Range<usize> {
         let Some(chunk) = self.chunks.get(c).filter(|chunk| self.layer(chunk.layer).interim) else {
             return 0..0;
@@ -151,13 +155,13 @@ impl Index {
         let first = self.chunks.partition_point(|other| other.layer <= chunk.layer);
         let last = self.chunks.partition_point(|other| other.layer <= chunk.layer + 1);
         let next = self.chunks.get(first..last).unwrap_or_default();
-        // The chunk before the first one that begins beyond the cell may reach it.
+        // The last chunk that begins below the first cell may reach it.
         let from = next.partition_point(|other| other.cell < chunk.cell).saturating_sub(1);
         let to = next.partition_point(|other| other.cell <= end);
         first + from..first + to.max(from)
     }
 
-    /// Whether the ranges lie chunk by chunk in the order of their kinds.
+    /// Returns whether the ranges lie chunk by chunk in the order of their kinds.
     fn is_sorted(&self) -> bool {
         self.order.is_sorted_by_key(|place| (place.chunk, place.kind))
     }
@@ -188,8 +192,8 @@ impl Index {
         }
     }
 
-    /// Reads what [`Self::write`] wrote for chunks with `parts` parts of nonzeros, and with interim changes in all layers but
-    /// the last if there are any; `None` for anything else.
+    /// Reads the bytes that [`Self::write`] wrote for chunks with `parts` parts of SH-rest; `None` for all other bytes. All
+    /// layers but the last have interim changes if `interim` is true.
     pub(in crate::packed) fn read(from: &mut ByteReader<'_>, parts: usize, interim: bool) -> Option<Self> {
         let layers = from.u8()?;
         let (is_sorted, layers) =
@@ -212,7 +216,7 @@ impl Index {
                 }
             }
             let form = *index.layers.get(layer)?;
-            // Cells do not fall within a layer, so that those of its chunks do not overlap.
+            // Within a layer the first cells of chunks do not fall, so that chunks do not overlap.
             let falls = index.chunks.last().is_some_and(|before| before.layer == layer && before.cell > cell);
             if !(1..=MAX_CHUNK).contains(&gaussians) || layer < last || falls {
                 return None;
@@ -222,7 +226,7 @@ impl Index {
             index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges: blank });
         }
         let mut seen = vec![0_u32; index.chunks.len()];
-        // The places of ranges that are sorted.
+        // The place of the next range, for ranges that are sorted.
         let mut next = Place { chunk: 0, kind: 0 };
         for _ in 0..ranges {
             let place = match is_sorted {
@@ -238,7 +242,7 @@ impl Index {
             let range =
                 index.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
             *range = Range { start: 0, length, checksum, integers };
-            // Each range once, and the base of a chunk before its others.
+            // Each range occurs once, and the base of a chunk comes before its other ranges.
             let seen = seen.get_mut(place.chunk as usize)?;
             let bit = 1 << place.kind;
             if *seen & bit != 0 || (*seen | bit) & 1 == 0 {
@@ -262,9 +266,9 @@ impl Index {
     }
 }
 
-/// The bounds of two bytes a number that hold `bounds`.
+/// Rounds bounds outward to numbers of which only the two high bytes are not 0.
 fn widened([least, most]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
-    // The numbers towards zero and away from it.
+    // `near` rounds towards zero, and `far` away from it.
     let near = |x: f32| f32::from_bits(x.to_bits() >> 16 << 16);
     let far = |x: f32| {
         let wide = f32::from_bits(x.to_bits().wrapping_add(0xffff) >> 16 << 16);

@@ -1,70 +1,71 @@
-//! What steers the decoder: steps, predictions and contexts, in integers that 32 bits hold.
+//! The integers that steer the decoder: steps, predictions and contexts.
 //!
-//! No product and no sum of these leaves the range of an `i32`, whatever a file holds, so every language computes the same
-//! ones. Floating point only makes values of decoded integers.
+//! Integers of 32 bits hold them. Whatever a file holds, no product and no sum of them leaves the range of an `i32`, so
+//! every language computes the same ones. Floats are only used to make values of decoded integers.
 
 use crate::packed::bitstream::bits::{BitReader, BitWriter};
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, TARGETS};
 use crate::packed::entropy::symbols::{LANES, Lanes, each};
 
-/// Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
+/// Fraction bits of values. Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
 pub(in crate::packed) const VALUE_BITS: u32 = 20;
-/// Features of predictions are multiples of 2^-9, and so are logarithms of steps, in octaves.
+/// Fraction bits of features of predictions, and of logarithms of steps, which are in octaves: both are multiples of 2^-9.
 pub(in crate::packed) const FEATURE_BITS: u32 = 9;
-/// Coefficients are multiples of 2^-12.
+/// Fraction bits of coefficients, which are multiples of 2^-12.
 pub(in crate::packed) const COEFFICIENT_BITS: u32 = 12;
 /// Bits by which products of coefficients and features are shifted before they are summed.
 const PRODUCT_SHIFT: u32 = 4;
 /// Largest absolute value of a feature.
 const MOST_FEATURE: i32 = (1 << 14) - 1;
-/// Largest step: 1.5. With larger ones a value is as good as unknown.
+/// Largest step: 1.5. With a larger step a value is as good as unknown.
 const MOST_STEP: u32 = 3 << (VALUE_BITS - 1);
 /// Bits of the mantissa of a step.
 const MANTISSA_BITS: u32 = 16;
 /// Largest logarithm of a step of a turn: that of 1.2 radians.
 const MOST_TURN: i32 = 135;
-/// Largest absolute value of the sum of a prediction before it is made a value.
+/// Largest absolute value of the sum of a prediction, before it is converted to a value.
 const MOST_SUM: i32 = 1 << 25;
-/// 512 times the binary logarithms of 2.5, the number of coordinates an axis has at a step of one radian, and of pi.
+/// 512 times two binary logarithms: of 2.5, the number of coordinates an axis has at a step of one radian, and of pi.
 const DIRECTIONS: i32 = 677;
 const HALF_TURN: i32 = 846;
-/// 512 / ln 2, and 512 times the binary logarithm of 2, the largest step of a position in standard deviations along the
-/// longest axis.
+/// Features per natural logarithm, which is 512 / ln 2, and 512 times the binary logarithm of 2. The largest step of a
+/// position is 2 standard deviations along the longest axis.
 const OCTAVES_PER_E: i32 = 739;
 const MOST_MOVE: i32 = 512;
-/// Rounds a logarithm of a number of values to bits: 2^n stands for up to 2^n times the root of 2.
+/// Added to 512 times the logarithm of a number of values before it is rounded down to bits. So `n` bits stand for up to
+/// `2^n * sqrt(2)` values.
 const HALF_BIT: i32 = 255;
-/// Largest number of bits of a coordinate of an axis and of a turn.
+/// Largest number of bits of a coordinate of the main axis, and of the turn about it.
 const MOST_AXIS_BITS: i32 = 15;
-/// 2.25 octaves. Cells narrower than 2^-2.25 steps have the first context.
+/// 2.25 octaves. Contexts are half an octave wide, and all cells narrower than `2^-1.75` steps have the first one.
 const FINENESS: i32 = 1152;
-/// The context of the widest cells.
+/// The context of the widest cells, and the last one.
 const LAST_FINENESS: i32 = 23;
-/// A value of 1 as a feature.
+/// The value 1 as a feature.
 pub(in crate::packed) const ONE: i32 = 1 << FEATURE_BITS;
 
-/// Coefficients of a prediction: a constant, and those of the average, the two classes and the scales.
+/// Number of coefficients of a prediction: a constant, and those of the average, the two classes and the three scales.
 pub(in crate::packed) const COEFFICIENTS: usize = 7;
-/// Coefficients of a prediction that are not of scales: of the first scale there are no others.
+/// Index of the last coefficient before those of scales. Scale `t` is predicted from the `t` scales before it.
 const BEFORE_SCALES: usize = 3;
-/// Coefficients of the logarithm of a step: a constant and those of the scales.
+/// Number of coefficients of the logarithm of a step: a constant, and those of the three scales.
 pub(in crate::packed) const SLOPES: usize = 4;
 
-/// A step of class 0: a mantissa below 2^16, times 2 to the power of minus `shift`, as a multiple of 2^-20.
+/// A step of class 0: `mantissa * 2^-shift`, in multiples of 2^-20. The mantissa is below 2^16.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::packed) struct Step {
     pub(in crate::packed) mantissa: u16,
     pub(in crate::packed) shift: i8,
 }
 
-/// A mantissa is shifted up by at most as many bits: it is then above the largest step.
+/// Most bits by which a mantissa is shifted up. A mantissa of 16 bits is then above the largest step.
 const MOST_SHIFT: i32 = 6;
 
 impl Step {
     /// Smallest and largest shift.
     pub(in crate::packed) const SHIFTS: std::ops::RangeInclusive<i8> = -6..=31;
 
-    /// The step nearest to `x`.
+    /// Returns the step nearest to `x`.
     fn of(x: f64) -> Self {
         let mut scaled = x * f64::from(1_u32 << (VALUE_BITS - MOST_SHIFT.unsigned_abs()));
         let mut shift = *Self::SHIFTS.start();
@@ -75,7 +76,7 @@ impl Step {
         Self { mantissa: rounded(scaled, 1.0, f64::from(u16::MAX)) as u16, shift }
     }
 
-    /// The step of a class, a multiple of 2^-20.
+    /// Returns the step of a class, in multiples of 2^-20.
     fn at(self, class: u32) -> u32 {
         let up = class.cast_signed() - i32::from(self.shift);
         let mantissa = u32::from(self.mantissa);
@@ -84,29 +85,29 @@ impl Step {
     }
 }
 
-/// The nearest whole number within limits.
+/// Rounds `x` to the nearest whole number, and clamps it to `least` and `most`.
 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
 fn rounded(x: f64, least: f64, most: f64) -> i64 {
     libm::rint(x).clamp(least, most) as i64
 }
 
-/// Low bits of constants, means and logarithms that are zero, and of coefficients. With more precise ones files are no
-/// smaller.
+/// Number of low bits that are 0: in constants, means and constants of logarithms, and in coefficients. With more precise
+/// numbers, files are no smaller.
 const CONSTANT_ZEROS: u32 = 2;
 const COEFFICIENT_ZEROS: u32 = 4;
 
-/// The multiple of 2^`zeros` that is nearest to `x`.
+/// Returns the multiple of `2^zeros` that is nearest to `x`.
 fn round_multiple(x: f64, zeros: u32) -> i16 {
     let most = f64::from(i16::MAX >> zeros);
     (rounded(x / f64::from(1_u32 << zeros), -most, most) << zeros) as i16
 }
 
-/// A constant or a mean as a feature.
+/// Returns a constant or a mean as a feature.
 fn constant(x: f64) -> i16 {
     round_multiple(x * f64::from(1_u32 << FEATURE_BITS), CONSTANT_ZEROS)
 }
 
-/// A coefficient as a multiple of 2^-12.
+/// Returns a coefficient as a multiple of 2^-12.
 fn coefficient(x: f64) -> i16 {
     round_multiple(x * f64::from(1_u32 << COEFFICIENT_BITS), COEFFICIENT_ZEROS)
 }
@@ -114,20 +115,20 @@ fn coefficient(x: f64) -> i16 {
 /// The integers of a file's parameters.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Integers {
-    /// Logarithm of the side of a cell.
+    /// Binary logarithm of the side of a cell, in 512ths.
     pub(in crate::packed) cell: i16,
     /// Steps of class 0 of the three scales, the opacity and the base colour.
     pub(in crate::packed) steps: [Step; 5],
-    /// Logarithms of the steps of turns and moves at shape class 0.
+    /// Logarithms of the steps of turns and moves at shape class 0, as linear functions of the scales.
     pub(in crate::packed) turns: [[i16; SLOPES]; 3],
     pub(in crate::packed) moves: [[i16; SLOPES]; 3],
-    /// Averages where there are no neighbours, as features.
+    /// Averages for Gaussians without neighbours, as features.
     pub(in crate::packed) means: [i16; TARGETS],
     pub(in crate::packed) predictors: [[i16; COEFFICIENTS]; TARGETS],
 }
 
 impl Integers {
-    /// The integers nearest to `p`. Base colours are in units of `dc_unit`.
+    /// Returns the integers nearest to `p`. Base colours are in units of `dc_unit`.
     pub(in crate::packed) fn of(p: &Parameters, dc_unit: f64) -> Self {
         let octaves = |x: f32| libm::log2(f64::from(x));
         let slopes = |row: [f32; SLOPES]| -> [i16; SLOPES] {
@@ -139,7 +140,7 @@ impl Integers {
         let [dc, _, opacity, s0, s1, s2] = p.factors.map(f64::from);
         let [colour, shape] = p.base.map(f64::from);
         let steps = [shape * s0, shape * s1, shape * s2, shape * opacity, colour * dc / dc_unit];
-        // A coefficient of features of another unit is divided by it.
+        // A coefficient whose feature has another unit than the target is divided by the unit of the target.
         let unit = |t: usize| if t < 4 { 1.0 } else { dc_unit };
         let predictors = std::array::from_fn(|t| {
             std::array::from_fn(|k| {
@@ -147,7 +148,7 @@ impl Integers {
                 let x = f64::from(p.predictors[t][k]) / own;
                 match k {
                     0 => constant(x),
-                    // The features of a scale are the scales before it.
+                    // Scales are predicted from earlier scales only.
                     _ if k > BEFORE_SCALES + t => 0,
                     _ => coefficient(x),
                 }
@@ -164,11 +165,11 @@ impl Integers {
     }
 }
 
-/// Bits of the width of a group of numbers.
+/// Number of bits of the width of a group of numbers.
 const WIDTH_BITS: u32 = 5;
 
 impl Integers {
-    /// The groups of numbers that are written with one width each, with the zeros that all of a group have below.
+    /// Returns the groups of numbers that are written with one width, and for each the number of low bits that are 0.
     fn groups(&mut self) -> Vec<(Vec<&mut i16>, u32)> {
         let mut groups = vec![(vec![&mut self.cell], CONSTANT_ZEROS)];
         for rows in [&mut self.turns, &mut self.moves] {
@@ -193,7 +194,7 @@ impl Integers {
         groups
     }
 
-    /// Writes all but the steps.
+    /// Writes all integers but the steps.
     pub(in crate::packed) fn write(&self, out: &mut BitWriter) {
         for (group, zeros) in self.clone().groups() {
             let numbers: Vec<i16> = group.into_iter().map(|number| *number >> zeros).collect();
@@ -205,7 +206,7 @@ impl Integers {
         }
     }
 
-    /// Reads what [`Self::write`] wrote; `None` for anything else.
+    /// Reads the integers that [`Self::write`] wrote; `None` for all other bits.
     pub(in crate::packed) fn read(&mut self, from: &mut BitReader<'_>) -> Option<()> {
         for (group, zeros) in self.groups() {
             let most = from.take(WIDTH_BITS) as u32;
@@ -228,16 +229,16 @@ impl Integers {
     }
 }
 
-/// Bits of a number and its sign; 0 for 0.
+/// Returns the number of bits of a number and its sign; 0 for 0.
 fn width(number: i16) -> u32 {
     if number == 0 { 0 } else { i16::BITS + 1 - (number ^ (number >> 15)).leading_zeros() }
 }
 
-/// The integers of a file's parameters, prepared for the walk.
+/// The integers of a file's parameters, prepared for the walk over a chunk.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Steering {
     cell: i32,
-    /// Steps of the scales, the opacity and the base colour at each class.
+    /// Steps of the scales, the opacity and the base colour, at each class.
     steps: [[u32; LAST_CLASS as usize + 1]; 5],
     turns: [[i32; SLOPES]; 3],
     moves: [[i32; SLOPES]; 3],
@@ -257,14 +258,14 @@ impl Steering {
         }
     }
 
-    /// The steps of target `t` at classes from 0 to 15.
+    /// Returns the step of target `t` in each lane, by its class from 0 to 15.
     #[inline(always)]
     pub(in crate::packed) fn step(&self, t: usize, class: &Lanes<u32>) -> Lanes {
         let steps = &self.steps[t.min(4)];
         each(|l| steps[(class[l] & u32::from(LAST_CLASS)) as usize].cast_signed())
     }
 
-    /// Predictions of target `t`, as values. The features are the average, the two classes and the scales.
+    /// Returns predictions of target `t`, as values. The features are the average, the two classes and the three scales.
     #[inline(always)]
     pub(in crate::packed) fn predict(&self, t: usize, features: &[Lanes; COEFFICIENTS - 1]) -> Lanes {
         let row = &self.predictors[t];
@@ -278,7 +279,7 @@ impl Steering {
         each(|l| sums[l].clamp(-MOST_SUM, MOST_SUM) << SHIFT)
     }
 
-    /// Logarithms of steps.
+    /// Returns the logarithms of steps for a row of coefficients.
     #[inline(always)]
     fn logarithms(row: &[i32; SLOPES], class: &Lanes<u32>, scales: &[Lanes; 3]) -> Lanes {
         let mut logs = [0; LANES];
@@ -291,7 +292,8 @@ impl Steering {
         logs
     }
 
-    /// Bits of a coordinate of the main axis, and of the turn about it, and whether the main axis is the longest.
+    /// Returns the number of bits of each coordinate of the main axis and of the turn about it, and whether the main axis
+    /// is the longest.
     #[inline(always)]
     pub(in crate::packed) fn axis_bits(
         &self,
@@ -315,7 +317,7 @@ impl Steering {
         (bits, needle)
     }
 
-    /// Logarithms of the steps of the position along each axis.
+    /// Returns the logarithms of the steps of the position along each axis.
     #[inline(always)]
     pub(in crate::packed) fn move_logs(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> [Lanes; 3] {
         let most = each(|l| MOST_MOVE + ((scales[0][l] * OCTAVES_PER_E) >> FEATURE_BITS));
@@ -327,20 +329,20 @@ impl Steering {
         [log(a), log(b), log(c)]
     }
 
-    /// The context of a step of the position.
+    /// Returns the context of a position. `log` is the logarithm of its step.
     #[inline(always)]
     pub(in crate::packed) fn fineness(&self, log: i32) -> u32 {
         ((self.cell - log + FINENESS) >> (FEATURE_BITS - 1)).clamp(0, LAST_FINENESS).cast_unsigned()
     }
 }
 
-/// Bits for a number of values whose logarithm this is.
+/// Returns the number of bits for `2^(log / 512)` values.
 #[inline(always)]
 fn bits_for(log: i32) -> u32 {
     ((log + HALF_BIT) >> FEATURE_BITS).clamp(0, MOST_AXIS_BITS).cast_unsigned()
 }
 
-/// A value as a feature.
+/// Returns a value as a feature.
 #[inline(always)]
 pub(in crate::packed) fn feature(value: i32) -> i32 {
     (value >> (VALUE_BITS - FEATURE_BITS)).clamp(-MOST_FEATURE, MOST_FEATURE)

@@ -1,8 +1,8 @@
-//! Base colours by what is seen on average.
+//! Base colours that are averages over points of view.
 //!
-//! The base colour of a Gaussian without its SH-rest is the average over all directions. It is seen from few of them, so
-//! files hold the colour that a few points of view see on average. What SH-rest that is there adds to that average is
-//! taken away again. So a Gaussian shows its best colour whether or not its SH-rest is there.
+//! In the source, the base colour of a Gaussian is the average of its colour over all directions. A Gaussian is seen from
+//! few directions, so a file holds the average colour from a few points of view. The decoder subtracts what the SH-rest
+//! that is there adds to that average. So a Gaussian has its best colour with and without its SH-rest.
 
 use super::bytes::shortened;
 use super::halves::doubled;
@@ -14,26 +14,26 @@ use crate::sparse::dictionary::Dictionary;
 use crate::support::maths::{Vec3, at_share};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
-/// Most points of view.
+/// Largest number of points of view.
 pub(in crate::packed) const MAX_POINTS: usize = 15;
-/// Longest row of one channel.
+/// Largest number of coefficients of one channel of SH-rest.
 pub(in crate::packed) const MOST: usize = MAX_COEFFICIENTS - 1;
 
-/// The points of view of a file; none if base colours are those of the source.
+/// The points of view of a file. Without points, base colours are those of the source.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct MeanView {
     pub(in crate::packed) points: Vec<Vec3>,
-    /// Distance, in world units, below which directions shrink to nothing.
+    /// Distance from a point, in world units, below which directions shrink towards zero.
     pub(in crate::packed) softening: f32,
 }
 
-/// Softening as a share of the median distance of the points from their middle.
+/// Softening as a share of the median distance of the points from their mean.
 const SOFTENING: f32 = 0.02;
-/// Least softening, of which the square is a normal number.
+/// Least softening. Its square is a normal number.
 const LEAST_SOFTENING: f32 = 1e-15;
 
 impl MeanView {
-    /// The view from up to [`MAX_POINTS`] points, more of which are left out.
+    /// Creates a view from the first [`MAX_POINTS`] of `points`.
     pub(in crate::packed) fn new(points: &[Vec3]) -> Self {
         if points.is_empty() {
             return Self::default();
@@ -49,7 +49,8 @@ impl MeanView {
         Self { softening: softening.max(shortened::<3>(LEAST_SOFTENING)), points }
     }
 
-    /// Averages of the basis functions over the directions from all points to `position`, over that of degree 0.
+    /// Returns the average of each basis function over the directions from all points to `position`, divided by the basis
+    /// function of degree 0.
     #[inline(always)]
     pub(in crate::packed) fn weights(&self, degree: ShDegree, position: Vec3) -> [f32; MOST] {
         let mut sums = [0.0; MOST];
@@ -65,7 +66,7 @@ impl MeanView {
         sums.map(|sum| sum * share)
     }
 
-    /// The base colours of `splats` that files hold.
+    /// Returns the base colours of `splats` as a file holds them.
     pub(in crate::packed) fn colours(&self, splats: &Splats) -> Vec<Vec3> {
         if self.points.is_empty() || splats.degree.rest() == 0 {
             return splats.geometry.dc.clone();
@@ -82,8 +83,9 @@ impl MeanView {
         parts.concat()
     }
 
-    /// Makes `out` [`Self::weights`] of the positions of all lanes, as far as the degree has coefficients.
-    // WebAssembly has few registers, and is slower where it keeps values of several such functions in them.
+    /// Stores in `out` the [`Self::weights`] of the positions of all lanes. Entries beyond the coefficients of the degree
+    /// are not set.
+    // WebAssembly has few registers. Code is slower there if the values of several such functions are kept in them.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(in crate::packed) fn lanes(
@@ -92,7 +94,7 @@ impl MeanView {
         positions: &[Lanes<f32>; 3],
         out: &mut [Lanes<f32>; MOST],
     ) {
-        // Where the degree is a constant, all lanes are computed at once.
+        // Where the degree is a constant, the compiler computes all lanes at once.
         match degree.rest_per_channel() {
             ..=3 => self.lanes_of::<3>(ShDegree::ONE, positions, out),
             4..=8 => self.lanes_of::<8>(ShDegree::TWO, positions, out),
@@ -101,7 +103,7 @@ impl MeanView {
         }
     }
 
-    /// [`Self::lanes`] of a degree with `PER_CHANNEL` coefficients a channel.
+    /// Computes [`Self::lanes`] for a degree with `PER_CHANNEL` coefficients a channel.
     #[inline(always)]
     fn lanes_of<const PER_CHANNEL: usize>(
         &self,
@@ -131,16 +133,16 @@ impl MeanView {
     }
 }
 
-/// The atoms of a dictionary with the values of all channels beside each other, to be weighed at once.
+/// The atoms of a dictionary with the channels of a coefficient side by side, so that all are weighted at once.
 #[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct SeenAtoms {
     per_channel: usize,
-    /// Of each atom its coefficients, and of these the channels and a zero.
+    /// The coefficients of each atom. Each has its channels, and a zero.
     rows: Vec<[f32; CHANNELS + 1]>,
 }
 
 impl SeenAtoms {
-    /// Nothing if there are no points of view.
+    /// Prepares the atoms of `dictionary`. The result is empty if there are no points of view.
     pub(in crate::packed) fn new(view: &MeanView, dictionary: &Dictionary) -> Self {
         let per_channel = dictionary.degree().rest_per_channel();
         if view.points.is_empty() || per_channel == 0 {
@@ -156,9 +158,10 @@ impl SeenAtoms {
         Self { per_channel, rows }
     }
 
-    /// What a code adds to a base colour by the weights of lane `l`. The last number means nothing.
+    /// Returns the sum that a code adds to a base colour, by the weights of lane `l`. The last number has no meaning.
     ///
-    /// It is called and not inlined: where the last number is known to be unused, three are computed one by one.
+    /// It must not be inlined. Where the compiler knows that the last number is unused, it computes the other three one by
+    /// one.
     #[inline(never)]
     pub(in crate::packed) fn seen(
         &self,
@@ -186,7 +189,7 @@ impl SeenAtoms {
     }
 }
 
-/// What a row adds to a base colour by these weights, of which there are as many as a channel has coefficients.
+/// Returns the sum that a row adds to a base colour. `weights` has one weight for each coefficient of a channel.
 #[inline(always)]
 pub(in crate::packed) fn seen_row(row: &[f32], weights: &[f32]) -> [f32; CHANNELS] {
     let mut sums = [0.0; CHANNELS];
@@ -200,7 +203,7 @@ pub(in crate::packed) fn seen_row(row: &[f32], weights: &[f32]) -> [f32; CHANNEL
 mod tests {
     use super::*;
 
-    /// A point may be where a Gaussian is, and be the only one.
+    /// A point of view may be at the position of a Gaussian, and may be the only point.
     #[test]
     fn weights_are_finite_wherever_points_are() {
         let degree = ShDegree::THREE;
@@ -218,7 +221,7 @@ mod tests {
         assert_eq!(MeanView::new(&[]), MeanView::default());
     }
 
-    /// From far away a point weighs as the basis does in its direction.
+    /// The weights of a far point are the basis functions in its direction.
     #[test]
     fn weights_are_those_of_directions() {
         let degree = ShDegree::new(2).unwrap();

@@ -1,19 +1,19 @@
 //! Cells of a grid in the order of the Morton curve.
 
-/// Bits of each coordinate.
+/// Number of bits of each coordinate of a cell.
 pub(in crate::packed) const BITS: u32 = 21;
 
-/// The number of the cell (x, y, z): the interleaved bits of its coordinates, which are below 2^21.
+/// Returns the number of the cell `(x, y, z)`: the interleaved bits of its coordinates, which are below 2^21.
 pub(in crate::packed) fn encode(cell: [u32; 3]) -> u64 {
     spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
 }
 
-/// Inverse of [`encode`]; `None` for numbers that are not of a cell.
+/// Returns the coordinates of the cell with the number `code`; `None` if there is no such cell.
 pub(in crate::packed) fn decode(code: u64) -> Option<[u32; 3]> {
     (code >> (3 * BITS) == 0).then(|| gathered(code))
 }
 
-/// The coordinates that the bits of any number make.
+/// Returns the coordinates that the low bits of any number make.
 #[inline(always)]
 pub(in crate::packed) fn gathered(code: u64) -> [u32; 3] {
     [gather(code), gather(code >> 1), gather(code >> 2)]

@@ -1,35 +1,34 @@
-//! Averages of the Gaussians that a lane decoded last.
+//! Averages of the Gaussians that each lane coded last.
 
 use crate::packed::bitstream::parameters::TARGETS;
 use crate::packed::entropy::shifts::{power, right};
 use crate::packed::entropy::symbols::{LANES, Lanes, each};
 
-/// Gaussians that are remembered. More of them gain little, since neighbours on the Morton curve are neighbours in
-/// space.
+/// Number of Gaussians that are remembered. More gain little, since neighbours on the Morton curve are neighbours in space.
 const WINDOW: usize = 16;
-/// Largest distance along an axis, in cells. Farther neighbours count as this far.
+/// Largest distance along an axis, in cells. A larger distance counts as this one.
 const FARTHEST: u32 = 1023;
-/// Bits of the largest weight, and one.
+/// Binary logarithm of a bound on weights: a weight is at most `2^(WEIGHT_BITS - 1)`.
 const WEIGHT_BITS: u32 = 12;
-/// Values that are averaged: those that are predicted, and the two classes.
+/// Number of values that are averaged: the targets and the two classes.
 pub(in crate::packed) const AVERAGED: usize = TARGETS + 2;
 
-/// The Gaussians that each lane decoded last.
+/// The last [`WINDOW`] Gaussians of each lane.
 #[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct NeighbourContext {
     cells: [[Lanes; 3]; WINDOW],
     features: [[Lanes; AVERAGED]; WINDOW],
-    /// Number seen so far.
+    /// Number of Gaussians pushed.
     seen: usize,
 }
 
 impl NeighbourContext {
-    /// Whether there are any.
+    /// Returns whether a Gaussian was pushed.
     pub(in crate::packed) fn is_known(&self) -> bool {
         self.seen > 0
     }
 
-    /// Averages of the features of the neighbours of `cell`, weighted by about the inverse squared distance.
+    /// Returns the averages of the remembered features, weighted by about the inverse squared distance from `cell`.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(in crate::packed) fn average(&self, cell: &[Lanes; 3]) -> [Lanes; AVERAGED] {
@@ -69,7 +68,7 @@ impl NeighbourContext {
     }
 }
 
-/// 2^(12 - n) for squared distances of n bits, 1 for more than 12.
+/// Returns the weight `2^(12 - n)` for squared distances of `n` bits, and 1 for more than 12 bits.
 #[inline(always)]
 fn weights(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
     let mut weight = [0; LANES];
@@ -82,19 +81,20 @@ fn weights(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
     weight
 }
 
-/// Bits of a positive number below 2^24.
+/// Returns the number of bits of a positive number below 2^24.
 #[inline(always)]
 fn length(number: i32) -> u32 {
-    // It is the exponent of the number as an f32, exactly. Vector registers count no bits.
+    // It is exactly the exponent of the number as an f32. Vector registers have no instruction that counts bits.
     ((number as f32).to_bits() >> 23) - 126
 }
 
-/// 2^31 over a positive number below 2^16 after that is shifted up to 16 bits, rounded down.
+/// Returns 2^31, divided by the number after it is shifted up to 16 bits, and rounded down. The number must be positive and
+/// below 2^16.
 #[inline(always)]
 fn inverted(number: i32) -> i32 {
-    // The mantissa of an f32, with its leading one, holds the shifted number.
+    // The mantissa of an f32 with its leading one holds the shifted number.
     let shifted = (((number as f32).to_bits() & 0x007f_ffff) | 0x0080_0000) >> 8;
-    // Vector registers divide floats alone. Adding 2^23 rounds to a whole number, which is this quotient or one more.
+    // Vector registers divide only floats. Adding 2^23 rounds to a whole number, which is this quotient or one more.
     const WHOLE: f32 = 8_388_608.0;
     let near = (2_147_483_648.0 / (shifted.cast_signed() as f32) + WHOLE).to_bits() - WHOLE.to_bits();
     let rest = (1_u32 << 31).wrapping_sub(near * shifted).cast_signed();
@@ -124,13 +124,13 @@ mod tests {
         number.is_multiple_of(2)
     }
 
-    /// The average feature of the last 16 of `seen` about `cell`.
+    /// Returns the average feature of the last 16 of `seen`, for a Gaussian in `cell`.
     fn average(seen: &[Seen], cell: [u32; 3]) -> f64 {
         let (mut sum, mut total) = (0.0, 0.0);
         for (other, feature) in seen.iter().rev().take(16) {
             let far = |k: usize| f64::from(other[k].abs_diff(cell[k]).min(1023));
             let squares = 4.0 * (far(0).powi(2) + far(1).powi(2) + far(2).powi(2)) + 1.0;
-            // 2^12 over the power of two above the number.
+            // The weight is 2^12, divided by the power of two above the number.
             let weight = (4096.0 / 2.0_f64.powf(squares.log2().floor() + 1.0)).max(1.0);
             sum += weight * f64::from(*feature);
             total += weight;
@@ -152,7 +152,8 @@ mod tests {
                         let seen: Vec<Seen> = (0..i).map(|i| of(l, i)).collect();
                         let expected = average(&seen, of(l, i).0);
                         for (a, values) in (0..).zip(&found) {
-                            // Halves of a unit for the sum and for the inverse of the weights, and one for the last shift.
+                            // Half a unit each is lost in the sum and in the inverse of the weights, and one unit in the
+                            // last shift.
                             let own = if is_even(a) { expected } else { -expected };
                             prop_assert!((f64::from(values[l]) - own).abs() <= 3.0, "{} {own}", values[l]);
                         }
@@ -179,14 +180,14 @@ mod tests {
         }
     }
 
-    /// The heaviest neighbours are in the same cell.
+    /// Neighbours in the same cell have the largest weights.
     #[test]
     fn weights_sum_up_to_less_than_2_to_the_16() {
         let cell = [[5; LANES]; 3];
         assert!(weights(&cell, &cell)[0] * i32::try_from(WINDOW).unwrap() < 1 << 16);
     }
 
-    /// In damaged files features are any numbers and cells any of 21 bits.
+    /// In damaged files a feature is any number, and a cell has any number of 21 bits.
     #[test]
     fn wild_features_are_averaged_somehow() {
         let mut around = NeighbourContext::default();

@@ -1,21 +1,21 @@
-//! The parameters of a file as they are fitted: steps, predictors, the grid.
+//! The parameters of a file as they are fitted, in f32: steps, predictors and the grid.
 
 use serde::{Deserialize, Serialize};
 
 use crate::support::maths::{Vec3, exp2};
 
-/// Values of a Gaussian that are predicted from its neighbours and its own earlier values: three scales,
-/// the opacity, three base colours.
+/// Number of values of a Gaussian that are predicted from its neighbours and from its own earlier values: three scales, the
+/// opacity, and three coordinates of the base colour.
 pub(in crate::packed) const TARGETS: usize = 7;
-/// Features of a prediction: 1, the neighbours' average of the same value, the two classes, and the scales known
-/// so far.
+/// Number of features of a prediction: 1, the average of the same value over neighbours, the two classes, and three scales,
+/// as far as they are known.
 pub(in crate::packed) const FEATURES: usize = 7;
-/// Features a step depends on: 1 and the scales.
+/// Number of features of the logarithm of a step: 1 and the three scales.
 const STEP_FEATURES: usize = 4;
 /// Number of the coarsest class of steps.
 pub(in crate::packed) const LAST_CLASS: u8 = 15;
 
-/// Parts of an octave. The step that a dictionary is learned with is rounded to one of them, which moves it by at most 9 %.
+/// Parts of an octave. The step with which a dictionary is learned is rounded to a part, which changes it by at most 9 %.
 const PER_OCTAVE: f64 = 4.0;
 
 /// Steps and predictors of a file.
@@ -25,28 +25,27 @@ pub(in crate::packed) struct Parameters {
     pub(in crate::packed) origin: Vec3,
     /// Side of a cell of the grid, in world units.
     pub(in crate::packed) cell: f32,
-    /// Step of class 0 for colour and for shape. Each further class doubles it.
+    /// Steps of class 0 for colour and for shape. The step doubles from class to class.
     pub(in crate::packed) base: [f32; 2],
     /// Factors on the steps of base colour, SH values, opacity and the three scales.
     pub(in crate::packed) factors: [f32; 6],
     /// Step of all SH values if a tolerance is promised; otherwise 0.
     pub(in crate::packed) promised: f32,
-    /// Binary logarithm of the factor for turning about each axis, as a linear function of 1 and the
-    /// scales.
+    /// Binary logarithm of the factor on the step of a turn about each axis, as a linear function of 1 and the scales.
     pub(in crate::packed) rotation: [[f32; STEP_FEATURES]; 3],
-    /// The same for moving along each axis.
+    /// Binary logarithm of the factor on the step of a move along each axis, in the same form.
     pub(in crate::packed) position: [[f32; STEP_FEATURES]; 3],
-    /// Mean base colour, and the orthonormal axes in which its deviation is coded.
+    /// Mean base colour, and the orthonormal axes along which differences from it are coded.
     pub(in crate::packed) dc_mean: Vec3,
     pub(in crate::packed) dc_axes: [Vec3; 3],
-    /// Averages that stand for neighbours where there are none.
+    /// Averages for Gaussians without neighbours.
     pub(in crate::packed) means: [f32; TARGETS],
     /// Coefficients of the predictions.
     pub(in crate::packed) predictors: [[f32; FEATURES]; TARGETS],
 }
 
 impl Parameters {
-    /// Whether all values are finite, and steps and their factors above 0.
+    /// Returns whether all values are finite, and steps and their factors above 0.
     pub(in crate::packed) fn are_usable(&self) -> bool {
         let steps = [&[self.cell], &self.base[..], &self.factors];
         let others = [
@@ -66,28 +65,28 @@ impl Parameters {
     }
 
     fn colour_step(&self, class: u8) -> f32 {
-        // 2 to the power of the class, which is at most 15.
+        // The factor is 2 to the power of the class, which is at most 15.
         self.base[0] * f32::from_bits((127 + u32::from(class)) << 23)
     }
 
-    /// Step of the base colour's three coordinates.
+    /// Returns the step of the three coordinates of the base colour at a colour class.
     pub(in crate::packed) fn dc_step(&self, colour: u8) -> f32 {
         self.colour_step(colour) * self.factors[0]
     }
 
-    /// Step of the values of SH codes.
+    /// Returns the step of SH values at a colour class.
     pub(in crate::packed) fn value_step(&self, colour: u8) -> f32 {
         if self.promised > 0.0 { self.promised } else { self.colour_step(colour) * self.factors[1] }
     }
 
-    /// Step of the values of SH codes of colour class 0 where no error is promised.
+    /// Returns the step of SH values at colour class 0 if no error is promised.
     pub(in crate::packed) fn free_value_step(&self) -> f32 {
         self.colour_step(0) * self.factors[1]
     }
 
-    /// The parameters that a dictionary is learned with: the step of values of each class is the nearest of [`PER_OCTAVE`] parts of
-    /// an octave. Learning depends on the last bits of its rows, and these differ where a scene is in other units or a step differs
-    /// by a hair.
+    /// Returns the parameters with which a dictionary is learned. The step of SH values is rounded to parts of an octave;
+    /// see [`PER_OCTAVE`]. A promised step stays as it is. Learning depends on the last bits of its rows, and these differ
+    /// if a scene is in other units or if a step differs slightly.
     pub(in crate::packed) fn for_learning(&self) -> Self {
         let mut other = self.clone();
         let octaves = libm::rint(libm::log2(f64::from(self.free_value_step())) * PER_OCTAVE) / PER_OCTAVE;
@@ -97,27 +96,27 @@ impl Parameters {
         other
     }
 
-    /// Steps of turns about each of the Gaussian's axes, in radians, of shape class 0.
+    /// Returns the steps of turns about each of the Gaussian's axes, in radians, at shape class 0.
     pub(in crate::packed) fn rotation_steps(&self, scales: Vec3) -> Vec3 {
         self.rotation.map(|row| self.base[1] * exp2(linear(row, scales)))
     }
 
-    /// Steps of the position along each of the Gaussian's axes, in world units, of shape class 0.
+    /// Returns the steps of the position along each of the Gaussian's axes, in world units, at shape class 0.
     pub(in crate::packed) fn position_steps(&self, scales: Vec3) -> Vec3 {
         self.position.map(|row| self.base[1] * exp2(linear(row, scales)))
     }
 
-    /// The coordinates of a base colour.
+    /// Returns the coordinates of a base colour along the axes.
     pub(in crate::packed) fn dc_coordinates(&self, dc: Vec3) -> Vec3 {
         self.dc_turned(std::array::from_fn(|c| dc[c] - self.dc_mean[c]))
     }
 
-    /// The coordinates of a difference between base colours.
+    /// Returns the coordinates of a difference between two base colours along the axes.
     pub(in crate::packed) fn dc_turned(&self, d: Vec3) -> Vec3 {
         self.dc_axes.map(|axis| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2])
     }
 
-    /// World coordinates of the centre of the cell (x, y, z).
+    /// Returns the world coordinates of the centre of the cell `(x, y, z)`.
     pub(in crate::packed) fn centre(&self, cell: [u32; 3]) -> [f64; 3] {
         std::array::from_fn(|k| f64::from(self.origin[k]) + (f64::from(cell[k]) + 0.5) * f64::from(self.cell))
     }
@@ -127,13 +126,13 @@ fn linear(row: [f32; STEP_FEATURES], scales: Vec3) -> f32 {
     row[0] + row[1] * scales[0] + row[2] * scales[1] + row[3] * scales[2]
 }
 
-/// The axis that a turn about matters least: a needle's longest, and a disc's shortest.
+/// Returns the axis about which a turn matters least: the longest one of a needle, and the shortest one of a disc.
 pub(in crate::packed) fn least_axis(scales: Vec3) -> usize {
     if scales[0] - scales[1] >= scales[1] - scales[2] { 0 } else { 2 }
 }
 
-/// The steps of an orientation as it is coded, in radians, for `steps` of turns about each axis: those of
-/// [`least_axis`]'s direction, and of the turn about it.
+/// Returns the steps of a rotation as it is coded, in radians: of the direction of [`least_axis`], and of the turn about
+/// it. `steps` are the steps of turns about each axis.
 pub(in crate::packed) fn rotation_steps(steps: Vec3, scales: Vec3) -> [f32; 2] {
     match least_axis(scales) {
         0 => [(steps[1] * steps[2]).sqrt(), steps[0]],

@@ -1,4 +1,4 @@
-//! What coarse steps leave: for each value one of three finer steps, and the low bits of rotations.
+//! Refinements: each coarse step becomes one of three finer steps, and rotations get more of their low bits.
 
 use super::geometry_syntax::{DC, FACTOR, Group, REFINED, coarsened, dropped, factor};
 use super::streams::Stream;
@@ -6,15 +6,15 @@ use crate::packed::bitstream::parameters::TARGETS;
 use crate::packed::entropy::shifts::power;
 use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
 
-/// Contexts by the number of coarse steps: none, one, more.
+/// Number of contexts by the number of coarse steps: none, one, more.
 const BY_COUNT: u32 = 3;
-/// Classes, or finenesses, that contexts are told apart by.
+/// Number of groups of classes, or of finenesses, with contexts of their own.
 const CLASSES: u32 = 8;
-/// Classes, and finenesses, of a context.
+/// Number of classes, and of finenesses, that share a context.
 const CLASS_WIDTH: u32 = 2;
 const FINENESS_WIDTH: u32 = 3;
 
-/// Codes the refinement of a group from `level` missing levels to one less. Returns `None` for impossible values.
+/// Codes the refinement of a group from `level` missing refinements to one fewer. Returns `None` for impossible values.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(in crate::packed) fn refine<S: Symbols>(
@@ -26,7 +26,7 @@ pub(in crate::packed) fn refine<S: Symbols>(
     let mut beyond = false;
     let finer = factor(level - 1);
     for k in DC..REFINED {
-        // Divisors are constants in each branch: vector registers divide by nothing else.
+        // Divisors are constants in each branch, since vector registers divide by nothing else.
         let (stream, class): (_, Lanes<u32>) = match k {
             DC..TARGETS => (Stream::FineDc, each(|l| group.colour[l] / CLASS_WIDTH)),
             _ => {
@@ -38,7 +38,7 @@ pub(in crate::packed) fn refine<S: Symbols>(
         let wanted = &group.wanted[k];
         let context: Lanes<u32> =
             each(|l| BY_COUNT * class[l].min(CLASSES - 1) + counts[l].unsigned_abs().min(BY_COUNT - 1));
-        // Zero is the step towards zero, which is the one that occurs most.
+        // Symbol 0 is the step towards zero, which occurs most.
         let symbols = s.symbols(stream.at(level), context, set, |l| {
             let rest = coarsened(wanted[l], finer) - FACTOR * counts[l];
             (if counts[l] < 0 { 1 - rest } else { 1 + rest }).cast_unsigned()
@@ -83,7 +83,7 @@ mod tests {
         std::array::from_fn(|l| values[(first + 5 * l) % values.len()])
     }
 
-    /// A group with the base of what it wants.
+    /// Returns a group that has only the base of the values that it codes.
     fn group(levels: usize, wanted: &[i32], codes: &[u32]) -> Group {
         let axis_bits: [Lanes<u32>; 2] = of(codes, 3);
         let axis_bits = axis_bits.map(|bits| bits.map(|b| 1 + b % 15));

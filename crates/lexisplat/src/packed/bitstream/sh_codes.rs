@@ -1,103 +1,103 @@
-//! SH-rest: the nonzeros of codes, in parts by their size, and exact rows.
+//! Coding of SH-rest: the nonzeros of codes, in parts by their size, and exact rows.
 
 use super::streams::{REST_PARTS, Stream};
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
 
-/// Colour classes that numbers of nonzeros are told apart by.
+/// Number of colour classes with contexts of their own for numbers of nonzeros.
 const COUNT_CLASSES: u32 = 12;
-/// Numbers of nonzeros of the part before that contexts are told apart by: none, one, more.
+/// Number of contexts by the number of nonzeros of the part before: none, one, more.
 const BY_BEFORE: u32 = 3;
-/// Colour classes of a context of a later part.
+/// Number of colour classes that share a context of a later part, and number of such groups of classes.
 const CLASS_WIDTH: u32 = 2;
 const LATER_CLASSES: u32 = 8;
-/// Contexts of the size of a first nonzero, by the number of nonzeros, and of later ones, by the size before.
+/// Number of contexts of the size of a first nonzero, by the number of nonzeros, and of a later one, by the size before.
 const FIRST_CONTEXTS: u32 = 8;
 const LATER_CONTEXTS: u32 = 16;
-/// Atoms that a symbol tells apart.
+/// Number of atoms that one symbol can tell apart.
 pub(in crate::packed) const PAGE: u32 = 256;
-/// Gaussians of each lane of which the numbers of nonzeros come first, and then the nonzeros. Lanes have numbers of their
-/// own, which differ less over many Gaussians, so that nearly all lanes are busy.
+/// Most Gaussians of a lane in a block. The numbers of nonzeros of a block come first, then its nonzeros. Lanes have
+/// different numbers of nonzeros. Over many Gaussians these differ less, so that nearly all lanes are busy.
 pub(in crate::packed) const BLOCK: usize = 64;
-/// Signs that are coded at once.
+/// Number of signs that are coded at once.
 const SIGNS: usize = 16;
-/// Marks a nonzero that is not the first one of its Gaussian and part.
+/// Marks a nonzero that is not the first one of its Gaussian in its part.
 const LATER: u8 = u8::MAX;
-/// Largest size of a nonzero.
+/// Upper bound of the sizes of nonzeros, which are smaller.
 const MAX_SIZE: u32 = 1 << 30;
 
-/// How SH-rest is coded.
+/// The parameters with which SH-rest is coded.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct RestForm {
     /// Length of a row; 0 for degree 0.
     pub(in crate::packed) dim: usize,
     pub(in crate::packed) atoms: usize,
-    /// Smallest size of each part, falling, at most [`REST_PARTS`]. That of the last part is 1.
+    /// Smallest size of each part, in falling order. There are at most [`REST_PARTS`] parts, and the last has the size 1.
     pub(in crate::packed) least: Vec<u32>,
 }
 
 /// The SH-rest of up to [`BLOCK`] Gaussians of each lane.
 #[derive(Debug, Default)]
 pub(in crate::packed) struct Rest {
-    /// Of each Gaussian: the lanes that have one, and their colour classes.
+    /// For each Gaussian of the block, the lanes that have one, and their colour classes.
     sets: Vec<u32>,
     colours: Vec<Lanes<u32>>,
     parts: [Part; REST_PARTS],
-    /// Exact rows of each lane, one after the other.
+    /// The exact rows of each lane, one after the other.
     rows: Lanes<Vec<f32>>,
-    /// Nonzeros of the first part of the Gaussian before.
+    /// Number of nonzeros of the last Gaussian in the first part; 0 for an exact row.
     last: Lanes<u32>,
-    /// Of each nonzero of each lane the context of its size, or [`LATER`].
+    /// For each nonzero of each lane, the context of its size, or [`LATER`].
     plan: Vec<[u8; LANES]>,
 }
 
 /// One part of the nonzeros of a block.
 #[derive(Debug, Default)]
 struct Part {
-    /// Of each Gaussian the number of nonzeros of each lane.
+    /// For each Gaussian, the number of nonzeros of each lane.
     counts: Vec<Lanes<u32>>,
-    /// Of each nonzero of each lane the atom, and the value in steps.
+    /// For each nonzero of each lane, the atom, and the value in steps.
     atoms: Vec<Lanes<u32>>,
     values: Vec<Lanes>,
     /// Number of nonzeros of each lane.
     totals: Lanes<u32>,
 }
 
-/// Places in the nonzeros of a lane.
+/// The next nonzero of each part, and the next number of an exact row, of a lane.
 #[derive(Debug, Default, Clone, Copy)]
 pub(in crate::packed) struct Cursor {
     next: [usize; REST_PARTS],
     row: usize,
 }
 
-/// The SH-rest of one Gaussian of a part of a block.
+/// The SH-rest of one Gaussian in one part of a block.
 #[derive(Debug)]
 pub(in crate::packed) enum Coded<'r> {
     Exact(&'r [f32]),
-    /// First nonzero and number of nonzeros.
+    /// Index of the first nonzero, and number of nonzeros.
     Code(usize, usize),
 }
 
 impl Rest {
-    /// Number of Gaussians of each lane so far.
+    /// Returns the number of Gaussians of the block so far in the longest lane.
     pub(in crate::packed) fn len(&self) -> usize {
         self.sets.len()
     }
 
-    /// The lanes that have Gaussian `i` of the block, and their colour classes.
+    /// Returns the lanes that have Gaussian `i` of the block, and their colour classes.
     #[inline(always)]
     pub(in crate::packed) fn of(&self, i: usize) -> (u32, &Lanes<u32>) {
         (self.sets[i], &self.colours[i])
     }
 
-    /// Adds a Gaussian of each lane in `set`, of these colour classes.
+    /// Adds a Gaussian of each lane in `set`, with their colour classes.
     #[inline(always)]
     pub(in crate::packed) fn push(&mut self, set: u32, colours: Lanes<u32>) {
         self.sets.push(set);
         self.colours.push(colours);
     }
 
-    /// Begins the next block.
+    /// Clears the block for the next one.
     pub(in crate::packed) fn clear(&mut self) {
         self.sets.clear();
         self.colours.clear();
@@ -110,7 +110,7 @@ impl Rest {
         self.rows.iter_mut().for_each(Vec::clear);
     }
 
-    /// Numbers of nonzeros and of exact rows of the block.
+    /// Returns the numbers of nonzeros and of exact rows of the block.
     pub(in crate::packed) fn sizes(&self, form: &RestForm) -> (usize, usize) {
         let nonzeros =
             self.parts.iter().map(|part| part.totals.iter().map(|&n| n as usize).sum::<usize>()).sum();
@@ -118,7 +118,8 @@ impl Rest {
         (nonzeros, rows)
     }
 
-    /// What part `part` holds of Gaussian `i` of lane `l`, in order. Parts that were not coded hold nothing.
+    /// Returns the SH-rest of Gaussian `i` of lane `l` in part `part`. Gaussians must come in order. A part that was not
+    /// coded has no nonzeros.
     #[inline(always)]
     pub(in crate::packed) fn coded(
         &self,
@@ -139,7 +140,7 @@ impl Rest {
         Coded::Code(from, count)
     }
 
-    /// The `count` nonzeros of lane `l` of a part from the one with number `from` on: atoms and values in steps.
+    /// Returns `count` nonzeros of lane `l` in part `part`, from index `from` on: pairs of an atom and a value in steps.
     #[inline(always)]
     pub(in crate::packed) fn nonzeros(
         &self,
@@ -154,13 +155,13 @@ impl Rest {
         atoms.iter().zip(values).map(move |(atoms, values)| (atoms[l] as u16, values[l]))
     }
 
-    /// Number of nonzeros of lane `l`.
+    /// Returns the number of nonzeros of lane `l` in all parts.
     pub(in crate::packed) fn total(&self, l: usize) -> usize {
         self.parts.iter().map(|part| part.totals[l] as usize).sum()
     }
 
-    /// Codes one part of the nonzeros of the block. `coded` holds the Gaussians of each lane. Returns `None` for
-    /// impossible values.
+    /// Codes one part of the nonzeros of the block. `coded` holds the Gaussians of each lane; a decoder passes none.
+    /// Returns `None` for impossible values.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(in crate::packed) fn part<S: Symbols>(
@@ -173,7 +174,7 @@ impl Rest {
         let least = *form.least.get(part)?;
         let most =
             part.checked_sub(1).and_then(|before| form.least.get(before)).map_or(MAX_SIZE, |&most| most);
-        // Of each lane the nonzeros that belong to this part.
+        // The nonzeros of each lane that belong to this part.
         let mut wanted: Lanes<Vec<(u16, i32)>> = Lanes::default();
         if let Some(coded) = coded {
             for (wanted, lane) in wanted.iter_mut().zip(coded) {
@@ -234,7 +235,7 @@ impl Rest {
         if part == 0 { self.exact(s, coded, form) } else { Some(()) }
     }
 
-    /// Codes the numbers of nonzeros.
+    /// Codes the numbers of nonzeros of one part.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn counts<S: Symbols>(
@@ -253,7 +254,7 @@ impl Rest {
                 each(|l| 2 * colour[l].min(COUNT_CLASSES - 1) + u32::from(self.last[l] > 1))
             } else {
                 let before = &self.parts[part - 1].counts[i];
-                // Rows that are stored exactly have no later parts.
+                // An exact row has no later parts.
                 let exact = &self.parts[0].counts[i];
                 for l in 0..LANES {
                     set &= !(u32::from(exact[l] == escape) << l);
@@ -281,7 +282,7 @@ impl Rest {
         (!beyond).then_some(())
     }
 
-    /// Plans the nonzeros of a part, and returns their number in each lane.
+    /// Computes the contexts of the nonzeros of a part. Returns the number of nonzeros of each lane.
     #[inline(always)]
     fn totals(&mut self, form: &RestForm, part: usize) -> Lanes<u32> {
         let escape = form.dim as u32 + 1;
@@ -299,7 +300,7 @@ impl Rest {
         for counts in &self.parts[part].counts {
             for l in 0..LANES {
                 let count = number(counts[l]);
-                // What a Gaussian without nonzeros writes the next one overwrites, or no one reads.
+                // The entry of a Gaussian without nonzeros is overwritten by the next Gaussian, or never read.
                 self.plan[next[l] as usize][l] = count.wrapping_sub(1).min(FIRST_CONTEXTS - 1) as u8;
                 next[l] += count;
             }
@@ -333,7 +334,7 @@ impl Rest {
     }
 }
 
-/// The lanes whose total is above `j`.
+/// Returns the set of lanes whose total is above `j`.
 #[inline(always)]
 fn longer(totals: &Lanes<u32>, j: usize) -> u32 {
     let mut set = 0;

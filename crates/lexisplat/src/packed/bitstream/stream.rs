@@ -1,27 +1,27 @@
-//! The bits that streams of symbols take.
+//! Numbers of bits of the streams of symbols.
 
 use serde::{Deserialize, Serialize};
 
 use crate::packed::bitstream::Stream;
 
-/// Size of one stream.
+/// The size of one stream.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct StreamBits {
-    /// The stream's name.
+    /// Name of the stream.
     pub name: String,
-    /// The attribute it belongs to.
+    /// Name of the attribute that the stream belongs to.
     pub attribute: &'static str,
-    /// Bits in all.
+    /// Number of bits of the stream.
     pub bits: f64,
 }
 
-/// Bits each stream took; empty if they were not counted.
+/// Number of bits of each stream. Empty if bits were not counted.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct BitCounts(pub(in crate::packed) Vec<f64>);
 
 impl BitCounts {
-    /// No bits yet.
+    /// Returns counts of 0 for all streams.
     pub(in crate::packed) fn zeros() -> Self {
         Self(vec![0.0; Stream::ALL.len()])
     }
@@ -33,7 +33,7 @@ impl BitCounts {
         }
     }
 
-    /// With the names and attributes of the streams.
+    /// Returns the counts with the names and the attributes of the streams.
     pub(crate) fn named(&self) -> Vec<StreamBits> {
         let counts = self.0.iter().copied().chain(std::iter::repeat(0.0));
         Stream::names()

@@ -1,16 +1,16 @@
-//! The streams of symbols. Each has contexts, and each context a table of probabilities.
+//! The streams of symbols. A stream has contexts, and a context has a table of probabilities.
 
 use super::geometry_syntax::MAX_LEVELS;
 
-/// Contexts of a stream.
+/// Number of contexts of a stream.
 pub(in crate::packed) const CONTEXTS: usize = 24;
-/// Parts into which nonzeros are split by their size, largest first.
+/// Number of parts into which nonzeros are split by their size, largest first.
 pub(in crate::packed) const REST_PARTS: usize = 3;
 
 /// Defines [`Stream`] from the names of the streams and of the attributes that they belong to.
 macro_rules! streams {
     ($count:literal: $($(#[$doc:meta])* $stream:ident => $attribute:literal,)+) => {
-        /// The streams, in the order of their tables.
+        /// The streams of symbols, in the order of their tables.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         #[repr(u8)]
         pub(in crate::packed) enum Stream {
@@ -20,7 +20,7 @@ macro_rules! streams {
         impl Stream {
             pub(in crate::packed) const ALL: [Self; $count] = [$(Self::$stream),+];
 
-            /// The attribute that it belongs to, by the name in reports.
+            /// Returns the name of the stream's attribute in reports.
             pub(in crate::packed) fn attribute(self) -> &'static str {
                 match self { $(Self::$stream => $attribute),+ }
             }
@@ -28,18 +28,18 @@ macro_rules! streams {
     };
 }
 streams! { 30:
-    /// Gaps between cells along the Morton curve.
+    /// Differences between the numbers of successive cells on the Morton curve.
     Cell => "position",
-    /// Step class of the colour.
+    /// Class of the steps of colour.
     ColourClass => "classes",
-    /// Step class of the shape.
+    /// Class of the steps of shape.
     ShapeClass => "classes",
     /// Logarithms of the standard deviations, longest axis first.
     Scale0 => "scale",
     Scale1 => "scale",
     Scale2 => "scale",
     Opacity => "opacity",
-    /// Direction of the axis about which turning matters least, and the turn about it. It has raw bits alone.
+    /// Direction of the axis about which a turn matters least, and the turn about it. This stream has raw bits only.
     Rotation => "rotation",
     /// Position within the cell along the Gaussian's own axes.
     Position0 => "position",
@@ -48,10 +48,10 @@ streams! { 30:
     Dc0 => "dc",
     Dc1 => "dc",
     Dc2 => "dc",
-    /// What coarse steps leave.
+    /// Refinements of positions and of base colours.
     FinePosition => "position",
     FineDc => "dc",
-    /// Numbers, atoms and sizes of the nonzeros of each part.
+    /// Numbers of nonzeros, atoms and values of each part.
     Count0 => "codes.counts",
     Count1 => "codes.counts",
     Count2 => "codes.counts",
@@ -61,18 +61,18 @@ streams! { 30:
     Value0 => "codes.values",
     Value1 => "codes.values",
     Value2 => "codes.values",
-    /// Which 256 atoms an atom is of, if there are more.
+    /// The page of 256 atoms that an atom is in, if there are more than one.
     AtomPage => "codes.indices",
-    /// How a Gaussian changes while those of the next layer around it are not there.
+    /// Interim changes of scales, opacities and base colours, while the next layer around a Gaussian is missing.
     InterimScale => "interim",
     InterimOpacity => "interim",
     InterimDc => "interim",
-    /// Coefficients of the atoms. They are in the head and no symbols of any context.
+    /// Coefficients of the atoms. They are in the head, and have no contexts.
     Dictionary => "dictionary",
 }
 
 impl Stream {
-    /// Names and attributes of all.
+    /// Returns the name and the attribute of each stream.
     pub(in crate::packed) fn names() -> impl Iterator<Item = (String, &'static str)> {
         Self::ALL.into_iter().map(|stream| (format!("{stream:?}"), stream.attribute()))
     }
@@ -83,7 +83,8 @@ impl Stream {
 }
 
 impl Stream {
-    /// Bits of its probabilities. There are hundreds of atoms, and a probability is at least one unit.
+    /// Returns the number of bits of the stream's probabilities. Atoms have more, since there are hundreds of them and a
+    /// probability is at least one unit.
     #[inline(always)]
     pub(in crate::packed) const fn precision(self) -> u32 {
         match self {
@@ -93,15 +94,16 @@ impl Stream {
     }
 }
 
-/// Streams of geometry. The step of their values depends on the levels that are missing, and so do their tables.
+/// Number of streams of geometry. The step of their values depends on the number of missing refinements, and so do their
+/// tables.
 const OF_GEOMETRY: usize = Stream::Count0 as usize;
-/// Numbers of levels that may be missing.
+/// Number of different numbers of missing refinements.
 const BY_LEVELS: usize = MAX_LEVELS + 1;
 /// Number of sets of contexts.
 pub(in crate::packed) const SLOTS: usize =
     BY_LEVELS * OF_GEOMETRY + Stream::Dictionary as usize - OF_GEOMETRY;
 
-/// A stream, and the number of its set of contexts among all.
+/// A set of contexts: the contexts of a stream at one number of missing refinements.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::packed) struct Slot {
     pub(in crate::packed) stream: Stream,
@@ -109,19 +111,19 @@ pub(in crate::packed) struct Slot {
 }
 
 impl Slot {
-    /// All sets of contexts in the order of their tables.
+    /// Returns all sets of contexts in the order of their tables.
     pub(in crate::packed) fn all() -> impl Iterator<Item = Self> {
         (0..SLOTS).map(|number| Self { stream: stream_of(number * CONTEXTS), number })
     }
 
-    /// The stream of a context, counted over all.
+    /// Returns the stream of a context, by its number among all contexts.
     pub(in crate::packed) fn stream_of(context: usize) -> Stream {
         stream_of(context)
     }
 }
 
 impl Slot {
-    /// Number of the context `context` among all contexts.
+    /// Returns the number of the context `context` of this set among all contexts.
     #[inline(always)]
     pub(in crate::packed) fn place(self, context: u32) -> usize {
         self.number * CONTEXTS + (context as usize).min(CONTEXTS - 1)
@@ -129,7 +131,7 @@ impl Slot {
 }
 
 impl Stream {
-    /// The contexts of the stream where this many levels are missing.
+    /// Returns the set of contexts of the stream, if `levels` refinements are missing.
     #[inline(always)]
     pub(in crate::packed) fn at(self, levels: usize) -> Slot {
         let number = match self as usize {
@@ -140,7 +142,7 @@ impl Stream {
     }
 }
 
-/// The stream of a context, counted over all.
+/// Returns the stream of a context, by its number among all contexts.
 pub(in crate::packed) fn stream_of(context: usize) -> Stream {
     let number = context / CONTEXTS;
     let shared = BY_LEVELS * OF_GEOMETRY;

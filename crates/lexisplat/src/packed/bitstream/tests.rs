@@ -1,4 +1,4 @@
-//! Heads and indexes come back, and nothing else is taken for them.
+//! Heads and indexes come back, and no other bytes are accepted.
 
 #![expect(clippy::cast_possible_truncation, reason = "test values fit")]
 
@@ -12,7 +12,8 @@ use crate::scene::sh::ShDegree;
 /// Most Gaussians of a chunk.
 const MOST: usize = 1 << 16;
 
-/// Chunks by layer and number of Gaussians, with ranges long enough, in an order that the index takes.
+/// Indexes of chunks with any layers and numbers of Gaussians. Ranges are long enough, and in an order that an index may
+/// have.
 fn indexes(parts: usize, interim: bool) -> impl Strategy<Value = Index> {
     let levels = prop::collection::vec(0_u8..=2, 1..4);
     let gaussians = prop_oneof![1..300_usize, Just(1), Just(MOST)];
@@ -37,7 +38,7 @@ fn indexes(parts: usize, interim: bool) -> impl Strategy<Value = Index> {
             (0..chunk.ranges.len() as u8).map(move |kind| Place { chunk: number, kind })
         };
         index.order = all.flat_map(place).collect();
-        // Any order in which bases come first.
+        // Any order is allowed in which bases come first.
         index
             .order
             .sort_by_key(|p| (p.kind > 0, u64::from(p.chunk * 8 + u32::from(p.kind)).wrapping_mul(seed | 1)));
@@ -52,7 +53,7 @@ fn written(index: &Index) -> Vec<u8> {
     out
 }
 
-/// The index that `bytes` are, whole.
+/// Reads the index that `bytes` are. `None` if bytes are left over.
 fn read(bytes: &[u8], parts: usize, interim: bool) -> Option<Index> {
     let mut from = ByteReader(bytes);
     Index::read(&mut from, parts, interim).filter(|_| from.0.is_empty())
@@ -71,7 +72,7 @@ proptest! {
         }
         let gaussians: usize = index.chunks.iter().map(|chunk| chunk.gaussians).sum();
         prop_assert_eq!(index.gaussians(), gaussians);
-        // Ranges lie one after the other.
+        // Ranges lie one after the other in the data.
         let mut end = 0;
         for place in &index.order {
             let range = index.chunks[place.chunk as usize].ranges[usize::from(place.kind)];
@@ -86,7 +87,7 @@ proptest! {
         prop_assert!(index.chunks.iter().map(|chunk| chunk.first).eq(firsts));
     }
 
-    /// What is taken is written again as it was, so nothing of it is ignored.
+    /// An index that is accepted is written again with the same bytes, so nothing in the bytes is ignored.
     #[test]
     fn changed_indexes_are_others_or_refused(index in indexes(2, true), at in any::<prop::sample::Index>(), bits in 1..=u8::MAX) {
         let mut bytes = written(&index);
@@ -99,7 +100,7 @@ proptest! {
     }
 }
 
-/// An index of two layers with chunks of both.
+/// Returns an index with chunks of two layers.
 fn two_layers() -> Index {
     let chunk = |layer: usize, gaussians: usize, kinds: usize| {
         let range = Range { length: (3 * gaussians as u32).div_ceil(8), ..Range::default() };
@@ -139,7 +140,7 @@ fn indexes_that_cannot_be_are_refused() {
     }
 }
 
-/// A head of rows of `dim` coefficients with points of view.
+/// Returns a head for rows of `dim` coefficients, with `points` points of view.
 fn head(dim: usize, points: usize, index: Index) -> Head {
     let mut p = Parameters {
         origin: [1.0, -2.0, 3.5],
@@ -170,7 +171,7 @@ fn head(dim: usize, points: usize, index: Index) -> Head {
     head
 }
 
-/// Heads of every kind.
+/// Returns heads of every kind.
 fn heads() -> Vec<Head> {
     let mut promised = head(45, 3, two_layers());
     promised.promised = 0.125;
@@ -187,12 +188,12 @@ fn heads_come_back() {
             assert!(Head::read(&bytes[..length], dim).is_none(), "{length} of {}", bytes.len());
         }
         assert!(Head::read(&[bytes.as_slice(), &[0]].concat(), dim).is_none());
-        // Coefficients say how many atoms there must be.
+        // The length of rows decides whether there must be atoms.
         assert!(Head::read(&bytes, if dim == 0 { 9 } else { 0 }).is_none());
     }
 }
 
-/// What is taken is written again as it was, so nothing of it is ignored.
+/// A head that is accepted is written again with the same bytes, so nothing in the bytes is ignored.
 #[test]
 fn changed_heads_are_others_or_refused() {
     for head in heads() {

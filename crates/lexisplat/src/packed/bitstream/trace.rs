@@ -1,6 +1,6 @@
-//! Traces: what the first Gaussians of a golden file decode to, symbol by symbol, as a new decoder can print it too.
+//! Traces: the first Gaussians of a golden file, symbol by symbol. A new decoder can print the same trace.
 //!
-//! docs/FORMAT-EXAMPLES.md says what the lines mean. They were compared with those of `scripts/decode_lexi.py`.
+//! docs/FORMAT-EXAMPLES.md explains the lines. They were compared with those of `scripts/decode_lexi.py`.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -26,7 +26,7 @@ enum Step {
     Bits { count: u32, value: u32, state: u32 },
 }
 
-/// A decoder that notes the steps of its first lane.
+/// A decoder that records the steps of its first lane.
 struct Traced<'a> {
     player: SymbolDecoder<'a>,
     steps: Vec<Step>,
@@ -66,7 +66,7 @@ impl Symbols for Traced<'_> {
     }
 }
 
-/// The lines of the steps of a Gaussian, by its number.
+/// Writes the lines of the steps of one Gaussian, whose number is `gaussian`.
 fn put(out: &mut String, range: usize, gaussian: &str, steps: &[Step]) {
     for step in steps {
         match step {
@@ -81,8 +81,8 @@ fn put(out: &mut String, range: usize, gaussian: &str, steps: &[Step]) {
     }
 }
 
-/// The steps of a block of a part by Gaussian, and those of signs with the number of the first Gaussian that they are for.
-/// `counts` are the numbers of nonzeros; `exact` says which Gaussians have exact rows of `dim` numbers.
+/// Splits the steps of a block of a part by Gaussian. Steps of signs have the number of the first Gaussian that they are
+/// for. `counts` holds the numbers of nonzeros, and `exact` says which Gaussians have exact rows of `dim` numbers.
 fn of_part(
     steps: &[Step],
     counts: &[usize],
@@ -91,7 +91,7 @@ fn of_part(
     dim: usize,
 ) -> Vec<(String, Vec<Step>)> {
     let mut steps = steps.iter().copied();
-    // The next symbol, and the raw bits that belong to it if it is the token of an integer.
+    // Takes the next symbol, and the raw bits that belong to it if it is the token of an integer.
     let mut symbol = |is_token: bool| {
         let first = steps.next().unwrap();
         let Step::Symbol { stream, symbol, .. } = first else { panic!("{first:?}") };

@@ -1,13 +1,13 @@
-//! Values of decoded integers.
+//! The values of decoded integers.
 //!
-//! Every step is an addition, a multiplication, a division or a square root of IEEE numbers, in an order of its own for
-//! each lane, so values are the same on every machine. Other decoders may compute them in other ways: docs/FORMAT.md says
-//! how far values may differ.
+//! Every step is an addition, a multiplication, a division or a square root of IEEE numbers. Each lane takes these steps in
+//! an order that does not depend on other lanes, so values are the same on every machine. Other decoders may compute values
+//! in other ways: docs/FORMAT.md says how far values may differ.
 
 use super::integer_model::VALUE_BITS;
 use crate::packed::entropy::symbols::{LANES, Lanes, each};
 
-/// A unit of integer values.
+/// The value of the integer 1.
 const UNIT: f32 = 1.0 / (1_u32 << VALUE_BITS) as f32;
 /// Largest logarithm of an opacity, as an integer value. Its exponential, 0.9999, counts as opaque.
 pub(in crate::packed) const MAX_LOG_OPACITY: i32 = -105;
@@ -15,16 +15,16 @@ pub(in crate::packed) const MAX_LOG_OPACITY: i32 = -105;
 /// Three numbers of each lane.
 pub(in crate::packed) type Lanes3 = [Lanes<f32>; 3];
 
-/// Integer values as numbers.
+/// Returns integer values as numbers.
 #[inline(always)]
 pub(in crate::packed) fn numbers(values: &Lanes) -> Lanes<f32> {
     each(|l| values[l] as f32 * UNIT)
 }
 
-/// 2 to the power `x`.
+/// Returns 2 to the power of `x`.
 #[inline(always)]
 fn exp2(x: f64) -> f64 {
-    // Taylor series of (2^f - 1) / f for f from -0.5 to 0.5, of which the error is below 2^-31.
+    // Taylor series of `(2^f - 1) / f` for `f` from -0.5 to 0.5. Its error is below 2^-31.
     const TERMS: [f64; 8] = [
         std::f64::consts::LN_2,
         0.240_226_506_959_100_7,
@@ -36,7 +36,7 @@ fn exp2(x: f64) -> f64 {
         0.000_001_321_548_679_014_431,
     ];
     let x = x.clamp(-1000.0, 1000.0);
-    // Adding and taking away this number rounds to a whole one.
+    // Adding this number and subtracting it again rounds to a whole number.
     const WHOLE: f64 = 6_755_399_441_055_744.0;
     let shifted = x + WHOLE;
     let f = x - (shifted - WHOLE);
@@ -48,10 +48,11 @@ fn exp2(x: f64) -> f64 {
     (sum * f + 1.0) * power
 }
 
-/// Natural logarithms of positive numbers.
+/// Returns the natural logarithm of a positive number.
 #[inline(always)]
 fn ln(x: f64) -> f64 {
-    // x = m 2^e with m from about 0.7 to 1.4; ln m = 2 artanh(z) with z = (m - 1) / (m + 1), at most 0.172.
+    // `x = m * 2^e` with `m` from about 0.7 to 1.4. `ln m = 2 artanh(z)` with `z = (m - 1) / (m + 1)`, which is at most
+    // 0.172.
     let bits = x.to_bits();
     let over = bits.wrapping_sub(0x3fe6_a09e_667f_3bcd);
     let m = f64::from_bits(bits.wrapping_sub(over & 0xfff0_0000_0000_0000));
@@ -65,7 +66,7 @@ fn ln(x: f64) -> f64 {
     e * std::f64::consts::LN_2 + 2.0 * z * sum
 }
 
-/// What trainers store of opacities: their logits, from logarithms as integer values.
+/// Returns the logits of opacities, as trainers store them. `log_opacity` holds logarithms of opacities as integer values.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(in crate::packed) fn logits(log_opacity: &Lanes) -> Lanes<f32> {
@@ -76,19 +77,19 @@ pub(in crate::packed) fn logits(log_opacity: &Lanes) -> Lanes<f32> {
     })
 }
 
-/// Axes and quaternions of rotations.
+/// The axes and the quaternions of rotations.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::packed) struct Turned {
-    /// The axes of the three scales.
+    /// The axis of each of the three scales.
     pub(in crate::packed) axes: [Lanes3; 3],
-    /// w, x, y, z.
+    /// Quaternions w, x, y, z.
     pub(in crate::packed) quaternions: [Lanes<f32>; 4],
 }
 
-/// Sine and cosine of `x` from 0 to half of pi.
+/// Returns the sine and the cosine of `x`, for `x` from 0 to pi / 2.
 #[inline(always)]
 fn sine_cosine(x: f32) -> (f32, f32) {
-    // Taylor series about the middle of the range, of which the error is below 2^-26.
+    // Taylor series about the middle of the range. Their errors are below 2^-26.
     let x = x - std::f32::consts::FRAC_PI_4;
     let xx = x * x;
     let sine =
@@ -100,25 +101,27 @@ fn sine_cosine(x: f32) -> (f32, f32) {
     ((cosine + sine) * root, (cosine - sine) * root)
 }
 
-/// The number from 0 to 1 in the middle of the `code`th of 2^`bits` parts.
+/// Returns the middle of part `code` of the range from 0 to 1, if that is cut into `2^bits` parts.
 #[inline(always)]
 fn share(code: u32, bits: u32) -> f32 {
     (code.cast_signed() as f32 + 0.5) * f32::from_bits((127 - bits) << 23)
 }
 
-/// The main axis of the point (s, t) of the square of axes, both from 0 to 1.
+/// Returns the main axis for the point `(s, t)` of the octahedral square. Both are from 0 to 1.
 #[inline(always)]
 pub(in crate::packed) fn main_axis(s: f32, t: f32) -> [f32; 3] {
     let (s, t) = (s * 2.0 - 1.0, t * 2.0 - 1.0);
     let (x, y) = (0.5 * (s + t), 0.5 * (s - t));
     let z = 1.0 - x.abs() - y.abs();
-    // For `max` the compiler calls a function where NaN may differ from that of vector instructions.
+    // `max` is not used, since the compiler calls a function for it where its NaN may differ from that of vector
+    // instructions.
     let z = if z > 0.0 { z } else { 0.0 };
     let scale = 1.0 / (x * x + y * y + z * z).sqrt();
     [x * scale, y * scale, z * scale]
 }
 
-/// The two axes across a main axis with z >= 0 that the shortest turn from (0, 0, 1) to it gives.
+/// Returns the two axes across a main axis with z >= 0. They are x and y after the shortest turn from (0, 0, 1) to the main
+/// axis.
 #[inline(always)]
 pub(in crate::packed) fn across([x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
     let a = 1.0 / (1.0 + z);
@@ -126,7 +129,7 @@ pub(in crate::packed) fn across([x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
     [[1.0 - x * x * a, b, -x], [b, 1.0 - y * y * a, -y]]
 }
 
-/// Rotations of their codes: two coordinates of the main axis and a turn, of `bits` bits each.
+/// Returns the rotations of codes: two coordinates of the main axis of `bits[0]` bits each, and a turn of `bits[1]` bits.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(in crate::packed) fn rotations(
@@ -153,7 +156,7 @@ pub(in crate::packed) fn rotations(
                 axis[k][l] = value;
             }
         }
-        // The shortest turn to u, (1 + z, -y, x, 0) normalised, after a turn about z.
+        // The rotation is a turn about z, followed by the shortest turn from z to u, which is (1 + z, -y, x, 0) normalised.
         let scale = 1.0 / (2.0 + 2.0 * u[2]).sqrt();
         let (qw, qx, qy) = ((1.0 + u[2]) * scale, -(u[1] * scale), u[0] * scale);
         let (w, x, y, z) = (qw * c, qx * c + qy * s, qy * c - qx * s, qw * s);
@@ -167,7 +170,7 @@ pub(in crate::packed) fn rotations(
     out
 }
 
-/// Powers of two of logarithms in 512ths of an octave.
+/// Returns the powers of two of logarithms in 512ths of an octave.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(in crate::packed) fn powers(logs: &Lanes) -> Lanes<f64> {

@@ -1,25 +1,25 @@
-//! The bytes of packed data that are there, and what is made of them.
+//! The ranges of packed data that a decoder has.
 
-/// The data of a packed scene, as far as it is there.
+/// The available data of a packed scene.
 #[derive(Clone, Copy)]
 pub(crate) enum Data<'d> {
-    /// All of it, or a first part.
+    /// All data, or their first bytes.
     First(&'d [u8]),
-    /// Some ranges.
+    /// Some of the ranges.
     Ranges(&'d dyn AvailableRanges),
 }
 
-/// Ranges of packed data that are there, whose checksums hold. They are told apart by where they start in the data.
+/// A set of verified ranges of packed data. A range is identified by its start in the data.
 pub(crate) trait AvailableRanges: Sync {
-    /// The bytes of the range, if they are held.
+    /// Returns the bytes of the range that starts at `start`, if they are still held.
     fn bytes(&self, start: u64) -> Option<&[u8]>;
 
-    /// Whether the range was there, held or not.
+    /// Returns whether the range that starts at `start` came. Its bytes may no longer be held.
     fn came(&self, start: u64) -> bool;
 }
 
 impl<'d> Data<'d> {
-    /// The bytes of a range, if all of them are held.
+    /// Returns the bytes of a range, if all of them are held.
     pub(in crate::packed) fn range(self, start: u64, length: u32) -> Option<&'d [u8]> {
         match self {
             Self::First(data) => {
@@ -30,7 +30,7 @@ impl<'d> Data<'d> {
         }
     }
 
-    /// Whether a range is there or was.
+    /// Returns whether a range is there, or was there.
     pub(in crate::packed) fn came(self, start: u64, length: u32) -> bool {
         match self {
             Self::First(data) => start.saturating_add(length.into()) <= data.len() as u64,
@@ -38,16 +38,16 @@ impl<'d> Data<'d> {
         }
     }
 
-    /// Whether the checksums of ranges are known to hold.
+    /// Returns whether the checksums of ranges were verified already.
     pub(in crate::packed) fn is_verified(self) -> bool {
         matches!(self, Self::Ranges(_))
     }
 }
 
-/// Choices of decoding a chunk.
+/// Options of decoding a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DecodeOptions {
-    /// Parts of nonzeros that are decoded, at most.
+    /// Largest number of parts of SH-rest that are decoded.
     pub(crate) sh_parts: usize,
     /// Whether the checksums of integers are verified.
     pub(crate) verify: bool,

@@ -1,4 +1,4 @@
-//! Decoding the chunks of a file.
+//! Decoding of the chunks of a file.
 
 use crate::packed::bitstream::atoms::WholeAtoms;
 use crate::packed::bitstream::chunk::Want;
@@ -20,7 +20,7 @@ use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::MemoryBudget;
 
-/// What all chunks are decoded with, and where they are.
+/// The head of a file, prepared for decoding its chunks.
 #[derive(Debug)]
 pub(in crate::packed) struct BitstreamDecoder {
     file: String,
@@ -31,7 +31,7 @@ pub(in crate::packed) struct BitstreamDecoder {
 }
 
 impl BitstreamDecoder {
-    /// Reads the head.
+    /// Reads the head of a packed scene.
     pub(in crate::packed) fn new(packed: &PackedHead) -> Result<Self> {
         let file = packed.file.clone();
         let bad = |what: &str| Error::malformed(&file, format!("packed {what}: no encoder writes it"));
@@ -58,18 +58,19 @@ impl BitstreamDecoder {
         &self.unpacker.dictionary
     }
 
-    /// Makes no interim changes but of scales from here on.
+    /// Drops all interim changes but those of scales.
     pub(in crate::packed) fn grow_only(&mut self) {
         let [growth, ..] = self.unpacker.frame.interim;
         self.unpacker.frame.interim = [growth, 0, 0];
     }
 
-    /// Layers, chunks and ranges.
+    /// Returns the index: layers, chunks and ranges.
     pub(in crate::packed) fn index(&self) -> &Index {
         &self.head.index
     }
 
-    /// Decodes chunk `c` to `place` from the ranges that are in `data`. Escapes are numbered from `first`.
+    /// Decodes chunk `c` into `place`, from the ranges that `data` has. The escapes in the result are numbered from
+    /// `first`.
     #[expect(clippy::too_many_arguments, reason = "what is decoded, from what and where to")]
     pub(in crate::packed) fn piece(
         &self,
@@ -123,8 +124,8 @@ impl BitstreamDecoder {
         Ok(piece)
     }
 
-    /// The ranges of a chunk that are wanted by their numbers and there, if their checksums hold. Those that follow a missing one
-    /// of their kind are left out.
+    /// Returns the ranges of a chunk that are there and for which `is_wanted` is true, and verifies their checksums.
+    /// Refinements after a missing refinement are left out, and so are parts of SH-rest after a missing part.
     fn checked<'d>(
         &self,
         data: Data<'d>,

@@ -1,4 +1,4 @@
-//! Decoding a chunk to what is drawn.
+//! Decoding of a chunk to the values that are drawn.
 
 #![expect(clippy::cast_possible_truncation, reason = "values are within limits that are checked or clamped")]
 #![expect(
@@ -28,26 +28,27 @@ use crate::support::maths::Vec3;
 use crate::support::memory_budget::MemoryBudget;
 use crate::support::simd::Simd;
 
-/// Largest absolute value of a value. Steps of the largest sizes take what encoders accept no farther.
+/// Bound of the absolute values of decoded values. All values that encoders accept are below it, even with the largest
+/// steps.
 const VALUE_LIMIT: i32 = 1 << (VALUE_BITS + 7);
 
-/// What values are made with.
+/// The parameters with which integers become values.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Frame {
     /// Corner of the grid, and side of a cell, in world units.
     pub(in crate::packed) origin: Vec3,
     pub(in crate::packed) cell: f32,
-    /// Mean base colour, the axes in which its deviation is coded, and the unit of these coordinates.
+    /// Mean base colour, the axes along which differences from it are coded, and the unit of these coordinates.
     pub(in crate::packed) dc_mean: Vec3,
     pub(in crate::packed) dc_axes: [Vec3; 3],
     pub(in crate::packed) dc_unit: f32,
-    /// Steps of interim changes; 0 if there are none.
+    /// Steps of the interim changes of scales, opacities and base colours; 0 if there are none.
     pub(in crate::packed) interim: [u32; KINDS],
-    /// Steps of the values of nonzeros, by colour class.
+    /// Steps of SH values, by colour class.
     pub(in crate::packed) value_steps: [f32; LAST_CLASS as usize + 1],
 }
 
-/// What chunks are decoded with.
+/// Everything that is needed to decode the chunks of a file.
 #[derive(Debug)]
 pub(in crate::packed) struct Unpacker {
     pub(in crate::packed) form: Form,
@@ -59,8 +60,10 @@ pub(in crate::packed) struct Unpacker {
 }
 
 impl Unpacker {
-    /// Decodes a chunk of a layer from the ranges that are there to `place`. Its first Gaussian is in cell `cell`. Interim
-    /// changes are made to Gaussians in the cells `alone`. Escapes are numbered from its start. `budget` holds everything but codes, and takes those.
+    /// Decodes a chunk of `layer` into `place`, from the ranges that are there. `cell` is the cell of its first Gaussian.
+    /// Gaussians in the cells `alone` get interim changes. Escapes are numbered from the start of the chunk. `budget`
+    /// already holds everything but the codes, which are added to it. Returns the codes, and the checksums of integers if
+    /// they are wanted.
     #[expect(clippy::too_many_arguments, reason = "what is decoded, from what and where to")]
     pub(in crate::packed) fn chunk(
         &self,
@@ -72,13 +75,13 @@ impl Unpacker {
         place: &mut Place<'_>,
         budget: &MemoryBudget<'_>,
     ) -> Result<(Piece, Vec<u32>), Refusal> {
-        // Registers of 512 bits were measured to be slower by 5 to 10 %.
+        // Registers of 512 bits were measured to be 5 to 10 % slower.
         Simd::current().narrow().run(Job { with: self, layer, cell, alone, ranges, want, place, budget })
     }
 }
 
 impl Unpacker {
-    /// Bytes of a nonzero in memory.
+    /// Returns the number of bytes of a nonzero in memory.
     fn nonzero_bytes(&self) -> usize {
         indices(&self.dictionary, Vec::new()).width() + size_of::<f16>()
     }
@@ -96,12 +99,12 @@ struct Job<'j, 'p, 'r> {
     budget: &'j MemoryBudget<'j>,
 }
 
-/// Why a chunk is not decoded.
+/// The reason for which a chunk is not decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::packed) enum Refusal {
-    /// No encoder writes it.
+    /// The ranges are not the output of an encoder.
     Damaged,
-    /// It takes more memory than is left.
+    /// The chunk takes more memory than is left.
     Full,
 }
 
@@ -141,7 +144,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             escapes.gaussians.extend(lane.gaussians);
             escapes.rows.extend(lane.rows);
         }
-        // Large values of f16 are infinite, and base colours may leave f32 by what codes add to them.
+        // Large values are infinite in f16, and base colours may leave f32 when the sums of codes are subtracted.
         let good = values.iter().fold(true, |good, v| good & v.is_finite())
             && place.dc.as_flattened().iter().fold(true, |good, v| good & v.is_finite());
         if good {
@@ -159,23 +162,23 @@ pub(in crate::packed) struct Nonzero {
     pub(in crate::packed) value: f16,
 }
 
-/// Where a decoded chunk goes.
+/// The output of a decoded chunk.
 struct Out<'j, 'p> {
     with: &'j Unpacker,
     place: &'j mut Place<'p>,
     /// The cell of the first Gaussian.
     cell: u64,
-    /// Cells around which the next layer is not there.
+    /// Cells around which the next layer is missing.
     alone: &'j [Range<u64>],
-    /// First Gaussian of each lane.
+    /// Index of the first Gaussian of each lane.
     starts: [usize; LANES + 1],
-    /// The nonzeros of each lane, by ascending atoms of each Gaussian.
+    /// The nonzeros of each lane. Those of one Gaussian are in ascending order of atoms.
     nonzeros: Lanes<Vec<Nonzero>>,
     escapes: Lanes<Escapes>,
-    /// The position of each Gaussian of the block, if there are points of view.
+    /// Positions of the Gaussians of the block. Empty if there are no points of view.
     positions: Vec<[Lanes<f32>; 3]>,
     budget: &'j MemoryBudget<'j>,
-    /// Whether the budget was too small.
+    /// Whether the chunk was refused because the budget was too small.
     is_full: bool,
 }
 
@@ -256,7 +259,7 @@ impl Sink for Out<'_, '_> {
                                 let added = Nonzero { atom, value: halved(value as f32 * step) };
                                 let mut at = nonzeros.len();
                                 nonzeros.push(added);
-                                // Codes are short, so that moving what follows is cheaper than sorting.
+                                // Codes are short, so moving the later nonzeros is cheaper than sorting.
                                 while at > first && nonzeros[at - 1].atom > atom {
                                     nonzeros[at] = nonzeros[at - 1];
                                     at -= 1;
@@ -288,14 +291,14 @@ impl Sink for Out<'_, '_> {
     }
 }
 
-/// One Gaussian of each lane as numbers.
+/// One Gaussian of each lane, as the values that are drawn.
 pub(in crate::packed) struct Drawn {
     pub(in crate::packed) position: [Lanes<f32>; 3],
     scales: [Lanes<f32>; 3],
     opacity: Lanes<f32>,
     rotation: [Lanes<f32>; 4],
     dc: [Lanes<f32>; 3],
-    /// Whether all values of a lane are within limits.
+    /// Whether all values of a lane are within [`VALUE_LIMIT`].
     within: Lanes<bool>,
 }
 
@@ -322,7 +325,7 @@ impl Drawn {
         if alone.iter().any(|&alone| alone) {
             change(&mut values, &group.interim, &frame.interim, alone);
         }
-        // A number and its sign have no bits in common below the limit, a power of two, if it is within limits.
+        // The limit is a power of two. If a number is within it, `number ^ sign` has no bits at or above it.
         let mut beyond = [0; LANES];
         for values in &values {
             for l in 0..LANES {
@@ -367,7 +370,7 @@ impl Drawn {
         }
     }
 
-    /// Whether the values of all lanes in `set` are within limits and finite.
+    /// Returns whether the values of all lanes in `set` are within limits and finite.
     #[inline(always)]
     pub(in crate::packed) fn can_be(&self, set: u32) -> bool {
         let all = self.position.iter().chain(&self.dc);

@@ -1,4 +1,4 @@
-//! Decoding the chunks of a packed scene, each without the others.
+//! Decoding of the chunks of a packed scene, each without the others.
 
 use std::ops::Range;
 
@@ -15,25 +15,26 @@ use crate::sparse::dictionary::Dictionary;
 use crate::support::error::{Error, Result};
 use crate::support::memory_budget::MemoryBudget;
 
-/// What all chunks of a packed scene are decoded with, and where they are.
+/// The head of a packed scene, prepared for decoding its chunks, and the chunks that are available.
 #[derive(Debug)]
 pub(crate) struct Decoder {
     file: String,
-    /// The chunks that are there, and the Gaussians of each.
+    /// Numbers of the available chunks, and the Gaussians of each.
     chunks: Vec<usize>,
     spans: Vec<Range<usize>>,
-    /// What is made of chunks.
+    /// Options of decoding a chunk.
     pub(crate) options: DecodeOptions,
     decoder: Box<BitstreamDecoder>,
 }
 
 impl Decoder {
-    /// Reads what all chunks need from `head`, for data of `whole` bytes of which any ranges will be there.
+    /// Prepares to decode the scene of `head`, from data of `whole` bytes. Any ranges may be there.
     pub(crate) fn new(head: &PackedHead, whole: u64) -> Result<Self> {
         Self::of_prefix(head, whole, whole)
     }
 
-    /// The same for data of which only the first `there` bytes are there. Chunks whose base is not are left out.
+    /// Prepares to decode the scene of `head` if only the first `there` of `whole` bytes of data are there. Chunks whose
+    /// base is missing are left out.
     pub(crate) fn of_prefix(head: &PackedHead, there: u64, whole: u64) -> Result<Self> {
         let decoder = BitstreamDecoder::new(head)?;
         if decoder.index().data_bytes() != whole {
@@ -54,28 +55,28 @@ impl Decoder {
         Ok(Self { file, chunks, spans, options, decoder: Box::new(decoder) })
     }
 
-    /// Layers, chunks and ranges of a scene whose data start at `data_start` of the file.
+    /// Returns the layers, chunks and ranges of the whole scene. Its data start at byte `data_start` of the file.
     pub(crate) fn outline(&self, data_start: u64) -> Outline {
         Outline::new(self.index(), data_start)
     }
 
-    /// The same without interim changes but of scales.
+    /// Drops all interim changes but those of scales.
     pub(in crate::packed) fn growing_only(mut self) -> Self {
         self.decoder.grow_only();
         self
     }
 
-    /// The layers, chunks and ranges of the whole scene.
+    /// Returns the index of the whole scene: layers, chunks and ranges.
     pub(in crate::packed) fn index(&self) -> &Index {
         self.decoder.index()
     }
 
-    /// The chunks of the next layer around chunk `c` that change what is made of it while they are missing.
+    /// Returns the chunks of the next layer around chunk `c`. While one of them is missing, chunk `c` has interim changes.
     pub(crate) fn around(&self, c: usize) -> Range<usize> {
         self.index().around(c)
     }
 
-    /// The Gaussians of each chunk.
+    /// Returns the Gaussians of each available chunk.
     pub(crate) fn spans(&self) -> &[Range<usize>] {
         &self.spans
     }
@@ -84,13 +85,13 @@ impl Decoder {
         self.decoder.dictionary()
     }
 
-    /// Bits that the dictionary took.
+    /// Returns the number of bits of the dictionary.
     pub(crate) fn dictionary_bits(&self) -> &BitCounts {
         &self.decoder.dictionary_bits
     }
 
-    /// Decodes chunk `c` of those that are there without extras. Escapes are numbered from its start. `budget` already holds
-    /// everything except its codes. Its bits are counted if `count_bits`.
+    /// Decodes available chunk `c` without extra properties. Its escapes are numbered from the start of the chunk. `budget`
+    /// already holds everything except the codes of the chunk. With `count_bits`, the bits of streams are counted.
     pub(crate) fn chunk(
         &self,
         data: Data<'_>,
@@ -109,7 +110,7 @@ impl Decoder {
         Ok((g, codes, piece.bit_counts))
     }
 
-    /// Decodes chunk `c` of those that are there to `place`. Escapes are numbered from `first`.
+    /// Decodes available chunk `c` into `place`. The escapes in the result are numbered from `first`.
     pub(in crate::packed) fn piece(
         &self,
         data: Data<'_>,

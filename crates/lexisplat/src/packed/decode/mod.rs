@@ -1,7 +1,7 @@
-//! The decoder: from bytes that are there, in any order of ranges, to what is drawn.
+//! The decoder: from the ranges that are there, which may come in any order, to the values that are drawn.
 //!
-//! With `bitstream/` and `entropy/` it is all that reads packed files. Of `encode/` these folders use `target.rs` and
-//! `canonical.rs`, since an encoder and a decoder of the syntax are one function.
+//! This folder, `bitstream/` and `entropy/` have all code that reads packed files. They also use `target.rs` and
+//! `canonical.rs` of `encode/`, because one function both encodes and decodes a part of the syntax.
 
 pub(in crate::packed) mod available_ranges;
 pub(in crate::packed) mod chunk_decoder;

@@ -1,4 +1,4 @@
-//! What a packed file is made of: layers, chunks and ranges.
+//! The outline of a packed file: its layers, chunks and ranges.
 
 use std::ops::Range;
 
@@ -8,11 +8,11 @@ use crate::packed::bitstream::{Index, LayerForm};
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Outline {
-    /// The layers, first the one that is drawn first.
+    /// The layers, in the order in which they are drawn.
     pub layers: Vec<LayerOutline>,
     /// The chunks of all layers, layer by layer.
     pub chunks: Vec<ChunkOutline>,
-    /// The ranges of all chunks in the order of the file.
+    /// The ranges of all chunks, in the order of the file.
     pub ranges: Vec<RangeOutline>,
 }
 
@@ -22,38 +22,38 @@ pub struct Outline {
 pub struct LayerOutline {
     /// Number of Gaussians.
     pub gaussians: u64,
-    /// Its chunks.
+    /// Indices of its chunks in [`Outline::chunks`].
     pub chunks: Range<usize>,
-    /// Levels of refinement of its chunks.
+    /// Number of refinements of each of its chunks.
     pub levels: usize,
-    /// Parts of the nonzeros of SH-rest of its chunks.
+    /// Number of parts of SH-rest of each of its chunks.
     pub sh_parts: usize,
 }
 
-/// A chunk: neighbouring Gaussians of a layer, which are decoded without others.
+/// A chunk: neighbouring Gaussians of a layer, which are decoded without other chunks.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct ChunkOutline {
-    /// Number of its layer.
+    /// Index of its layer in [`Outline::layers`].
     pub layer: usize,
-    /// Number of its first Gaussian in the file.
+    /// Index of its first Gaussian in the file.
     pub first: usize,
     /// Number of Gaussians.
     pub gaussians: usize,
-    /// Least and largest coordinates of the centres of its Gaussians, or some beyond. They mean nothing if it is the only
-    /// chunk of the file.
+    /// Coordinates that are at most the least, and at least the largest, of the centres of its Gaussians. Zeros if it is
+    /// the only chunk of the file.
     pub bounds: [[f32; 3]; 2],
 }
 
-/// A range: bytes of a chunk that are fetched, checked and decoded together.
+/// A range: bytes of a chunk that are fetched, verified and decoded together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct RangeOutline {
-    /// Number of its chunk.
+    /// Index of its chunk in [`Outline::chunks`].
     pub chunk: usize,
-    /// What it holds.
+    /// The kind of its content.
     pub kind: RangeKind,
-    /// Where it is in the file.
+    /// Its place in the file, in bytes.
     pub bytes: Range<u64>,
     /// CRC-32 of its bytes.
     pub checksum: u32,
@@ -61,22 +61,22 @@ pub struct RangeOutline {
     pub integers: u32,
 }
 
-/// What a range holds.
+/// The kind of the content of a range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum RangeKind {
-    /// Everything but SH-rest, some of it coarse. Nothing of a chunk is decoded without it.
+    /// Everything but SH-rest, some of it coarse. No range of a chunk can be decoded without it.
     Base,
-    /// What makes it finer. Those of lower numbers are needed too, which count from 0.
+    /// A refinement of the base, by its number from 0. It needs all refinements of lower numbers.
     Refinement(usize),
-    /// A part of the nonzeros of SH-rest, those of the largest values in part 0. Those of lower numbers are needed too.
+    /// A part of SH-rest, by its number from 0. Part 0 has the largest values. A part needs all parts of lower numbers.
     Sh(usize),
-    /// What Gaussians look like while those of the next layer are not there.
+    /// Interim changes: changes of Gaussians while those of the next layer are missing.
     Interim,
 }
 
 impl RangeKind {
-    /// The kind of range number `k` of a chunk.
+    /// Returns the kind of range `k` of a chunk.
     pub(in crate::packed) fn of(form: LayerForm, k: usize) -> Self {
         match k {
             0 => Self::Base,
@@ -88,7 +88,7 @@ impl RangeKind {
 }
 
 impl Outline {
-    /// The outline of `index`, whose data start at `data_start` of the file.
+    /// Creates the outline of `index`. The data start at byte `data_start` of the file.
     pub(in crate::packed) fn new(index: &Index, data_start: u64) -> Self {
         let layer = |form: &LayerForm| {
             let (levels, sh_parts) = (form.levels, form.parts);
@@ -119,7 +119,7 @@ impl Outline {
         Self { layers, chunks, ranges: index.order.iter().filter_map(range).collect() }
     }
 
-    /// The number of a range within its chunk, by which errors name it.
+    /// Returns the index of a range within its chunk, by which errors name it.
     pub(crate) fn number(&self, range: &RangeOutline) -> usize {
         let layer = self.chunks.get(range.chunk).and_then(|chunk| self.layers.get(chunk.layer));
         let (levels, parts) = layer.map_or((0, 0), |layer| (layer.levels, layer.sh_parts));
@@ -131,8 +131,8 @@ impl Outline {
         }
     }
 
-    /// Where in the file the last of the bases of the first layer ends: with so many bytes the whole scene is drawn, as
-    /// coarsely as that layer shows it.
+    /// Returns the place in the file, in bytes, where the bases of the first layer end. With so many bytes the whole scene
+    /// is drawn, as coarsely as that layer shows it.
     #[must_use]
     pub fn first_layer_end(&self) -> u64 {
         let is_first = |range: &&RangeOutline| {

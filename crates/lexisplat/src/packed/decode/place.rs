@@ -1,4 +1,4 @@
-//! What a chunk decodes to.
+//! The output of decoding a chunk.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::sparse::codes::{Escapes, Indices};
 use crate::sparse::dictionary::Dictionary;
 use crate::support::maths::Vec3;
 
-/// Where a chunk's geometry goes.
+/// The slices of a scene into which the geometry of a chunk is decoded.
 #[derive(Debug, Default)]
 pub(in crate::packed) struct Place<'a> {
     pub(in crate::packed) positions: &'a mut [Vec3],
@@ -18,11 +18,11 @@ pub(in crate::packed) struct Place<'a> {
     pub(in crate::packed) opacities: &'a mut [f32],
     pub(in crate::packed) scales: &'a mut [Vec3],
     pub(in crate::packed) rotations: &'a mut [[f32; 4]],
-    /// Nonzeros of each Gaussian.
+    /// Number of nonzeros of each Gaussian.
     pub(in crate::packed) counts: &'a mut [u8],
 }
 
-/// What a chunk holds beside geometry and counts.
+/// The codes of a decoded chunk, without their counts.
 #[derive(Debug, Default)]
 pub(in crate::packed) struct Piece {
     pub(in crate::packed) atoms: Vec<u16>,
@@ -31,12 +31,12 @@ pub(in crate::packed) struct Piece {
     pub(in crate::packed) bit_counts: BitCounts,
 }
 
-/// Takes the first `count` entries from `values`.
+/// Takes the first `count` entries out of `values`.
 fn take<'a, T>(values: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     values.split_off_mut(..count).unwrap_or_default()
 }
 
-/// The places of all chunks, which hold these Gaussians one after the other.
+/// Splits a scene into the places of all chunks. `spans` holds the Gaussians of each chunk, one chunk after the other.
 pub(in crate::packed) fn places<'a>(
     g: &'a mut Geometry,
     counts: &'a mut [u8],

@@ -1,4 +1,4 @@
-//! Puts unpacked Gaussians back in the order of their source.
+//! Restores the order of the source in unpacked scenes.
 
 use half::f16;
 
@@ -10,8 +10,7 @@ use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
 
-/// The place in the file of each of `len` Gaussians of the source; `None` if `order` is not a
-/// permutation of them.
+/// Returns the index in the file of each of `len` Gaussians of the source. `None` if `order` is not a permutation of them.
 fn inverse(order: &[u32], len: usize) -> Option<Vec<usize>> {
     let mut from = vec![usize::MAX; len];
     for (k, &source) in order.iter().enumerate() {
@@ -24,7 +23,7 @@ fn inverse(order: &[u32], len: usize) -> Option<Vec<usize>> {
     (order.len() == len).then_some(from)
 }
 
-/// `model`, which is from `file`, with Gaussian k moved to `order[k]`.
+/// Moves Gaussian `k` of `model` to index `order[k]`. `file` is the file's name in errors.
 pub(in crate::packed) fn reordered(model: Model, order: &[u32], file: &str) -> Result<Model> {
     let from = inverse(order, model.len())
         .ok_or_else(|| Error::malformed(file, "the packed order is not a permutation of the Gaussians"))?;
@@ -47,7 +46,7 @@ pub(in crate::packed) fn gather_geometry(g: &mut Geometry, from: &[usize]) {
     }
 }
 
-/// Replaces `values` by the entries at the indices `from`. Empty arrays stay empty.
+/// Replaces `values` by the entries at the indices `from`. An empty list stays empty.
 pub(in crate::packed) fn gather<T: Copy>(values: &mut Vec<T>, from: impl Iterator<Item = usize>) {
     if !values.is_empty() {
         *values = from.map(|k| values[k]).collect();

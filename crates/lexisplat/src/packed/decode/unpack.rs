@@ -1,4 +1,4 @@
-//! Decoding a packed scene as a whole.
+//! Decoding of a packed scene as a whole.
 
 use super::available_ranges::Data;
 use super::decoder::Decoder;
@@ -14,11 +14,12 @@ use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 use crate::support::parallel::map_vec;
 
 impl Packed {
-    /// Decodes the scene, whose SH stay sparse codes, in the order of its source if that was kept.
+    /// Decodes the scene. Its SH coefficients stay sparse codes. Gaussians are in the order of the source if that was kept,
+    /// otherwise in the order of the file.
     ///
     /// # Errors
-    /// [`crate::Error::Format`] naming the damaged part, [`crate::Error::Limit`] for a scene larger than the
-    /// limits of its reader.
+    /// [`crate::Error::Format`] that names the damaged part; [`crate::Error::Limit`] if the scene is larger than the limits
+    /// of its reader.
     pub fn unpack(&self) -> Result<Model> {
         self.unpack_with(&self.decoder()?)
     }
@@ -27,7 +28,8 @@ impl Packed {
         Decoder::new(self.head(), self.data().len() as u64)
     }
 
-    /// [`Self::unpack`] with a decoder of this scene, which may leave some of it out.
+    /// Decodes the scene as [`Self::unpack`] does, with a decoder of this scene whose options may leave out parts of
+    /// SH-rest.
     pub(crate) fn unpack_with(&self, decoder: &Decoder) -> Result<Model> {
         let model = self.decode_with(decoder, self.data(), false)?.0;
         match self.order() {
@@ -36,24 +38,24 @@ impl Packed {
         }
     }
 
-    /// Bits each stream takes, tables and parameters apart.
+    /// Returns the number of bits of each stream. Those of tables and other parameters are not counted.
     ///
     /// # Errors
-    /// As [`Self::unpack`].
+    /// Those of [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
         let (_, bits) = self.decode_with(&self.decoder()?, self.data(), true)?;
         Ok(bits.named())
     }
 
-    /// The dictionary alone.
+    /// Returns the dictionary alone.
     ///
     /// # Errors
-    /// As [`Self::unpack`].
+    /// Those of [`Self::unpack`].
     pub fn unpack_dictionary(&self) -> Result<Dictionary> {
         Ok(self.decoder()?.dictionary().clone())
     }
 
-    /// What the limits leave for the codes after `self` and the geometry of the scene.
+    /// Returns the memory that the limits leave for the codes. `self` and the geometry of the decoded scene are subtracted.
     fn budget(&self) -> Result<MemoryBudget<'_>> {
         let head = self.head();
         let words = self.order().map_or(0, <[u32]>::len);
@@ -69,11 +71,11 @@ impl Packed {
         Ok(budget)
     }
 
-    /// What the first layer of two shows while the second is not there, with its scales grown and no other change; `None` if
-    /// there is one layer. Its Gaussians are the first of those of the scene.
+    /// Decodes the first of two layers as it is drawn while the second is missing, with its scales grown and no other
+    /// interim change. Its Gaussians are the first ones of the file. `None` if there is one layer.
     ///
     /// # Errors
-    /// As [`Self::unpack`].
+    /// Those of [`Self::unpack`].
     pub fn first_layer(&self) -> Result<Option<Model>> {
         let Some(end) = self.decoder()?.index().first_layer_end() else { return Ok(None) };
         let data = usize::try_from(end).ok().and_then(|end| self.data().get(..end)).unwrap_or_default();
@@ -90,7 +92,7 @@ impl Packed {
         let extras = if n == self.len() { self.extras().to_vec() } else { Vec::new() };
         let mut g = Geometry { extras, ..Geometry::zeros(n) };
         let mut counts = vec![0; n];
-        // Chunks write straight to where they belong, so that a scene is in memory once.
+        // Chunks are decoded into their final places, so that a scene is in memory once.
         let spans = decoder.spans();
         let work: Vec<_> = places(&mut g, &mut counts, spans).into_iter().zip(spans).enumerate().collect();
         let pieces = map_vec(work, |(c, (mut place, span))| {

@@ -1,7 +1,8 @@
-//! What the Gaussians of a first layer look like while those of the second are not there.
+//! Interim changes: how the Gaussians of the first layer are drawn while the second layer is missing.
 //!
-//! They grow and become more opaque by what is missing around them (docs/METHOD.md, "Layers"). Pictures may say more, and
-//! their colours too.
+//! A Gaussian grows and becomes more opaque with the opacity and area of the Gaussians that are missing around it
+//! (docs/METHOD.md, "Layers"). Fitting to pictures may change its opacity in another way, change its colour, and add to its
+//! growth.
 
 use super::appearance::AppearanceChange;
 use crate::packed::bitstream::parameters::Parameters;
@@ -11,36 +12,39 @@ use crate::scene::splats::Geometry;
 use crate::support::maths::log_sigmoid;
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
-/// Steps of the changes: of logarithms of scales and opacities, and of base colours as SH coefficients.
+/// Steps of the interim changes: of the natural logarithm of scales, of that of the opacity, and of SH coefficients of the
+/// base colour.
 pub(in crate::packed) const STEPS: [f64; KINDS] = [0.4, 0.5, 0.6];
-/// Most steps by which scales grow.
+/// Most steps by which scales grow without pictures.
 const MOST_GROWTH: f64 = 2.0;
-/// Growth of the logarithm of scales by what is missing, GROWTH ln(1 + MISSING x), where x is what of opacity times area is
-/// missing over what the Gaussian has, and by the probability p with which it was drawn, RARE ln p.
+/// The natural logarithms of scales grow by `GROWTH * ln(1 + MISSING * x) + RARE * ln(p)`. `x` is the opacity times area of
+/// the missing Gaussians nearest to this one, over its own. `p` is the probability with which the Gaussian was drawn into
+/// its layer.
 const GROWTH: f64 = 0.25;
 const MISSING: f64 = 0.3;
 const RARE: f64 = -0.15;
-/// Growth of the logarithm of the opacity, as a multiple of ln(1 + x).
+/// The natural logarithm of the opacity grows by `OPACITY * ln(1 + x)`, with the `x` of [`GROWTH`].
 const OPACITY: f64 = 0.3;
-/// Most steps of a change of an opacity and of a colour.
+/// Largest absolute number of steps of a change.
 const MOST_STEPS: f64 = 1000.0;
-/// Gaussians on both sides along the Morton curve among which the nearest is looked for.
+/// Number of Gaussians on each side along the Morton curve among which the nearest one is searched for.
 const NEIGHBOURS: usize = 16;
 
-/// How a first layer stands in for a second one.
+/// The interim changes of all layers but the last.
 #[derive(Debug, Default)]
 pub(in crate::packed) struct Alone {
-    /// Of each Gaussian of the first layer the steps by which its scales grow.
+    /// For each Gaussian of these layers, the number of steps by which its scales grow.
     growth: Vec<i32>,
-    /// And those by which its opacity grows, if pictures say nothing.
+    /// For each of these Gaussians, the number of steps by which its opacity grows if there are no changes from pictures.
     opacity: Vec<i32>,
-    /// Number of layers that change.
+    /// Number of layers that have interim changes: all but the last.
     layers: usize,
 }
 
 impl Alone {
-    /// The changes of the Gaussians at these places of `g`, which are all layers in the order of the file, of so many
-    /// Gaussians each. `probability` says how probable a Gaussian was to be drawn into its layer.
+    /// Computes the changes of the Gaussians at `places` of `g`. `places` holds all layers in the order of the file, and
+    /// `layers` the number of Gaussians of each. `probability(layer, i)` is the probability with which Gaussian `i` of
+    /// `places` was drawn into `layer`.
     pub(in crate::packed) fn new(
         g: &Geometry,
         places: &[MortonKey],
@@ -63,12 +67,13 @@ impl Alone {
         alone
     }
 
-    /// Whether Gaussians of a layer change.
+    /// Returns whether the Gaussians of `layer` have interim changes.
     pub(in crate::packed) fn has(&self, layer: usize) -> bool {
         layer < self.layers
     }
 
-    /// The steps of Gaussian `i` in the order of the file, if pictures say nothing or if they ask for `change`.
+    /// Returns the interim changes, in steps, of Gaussian `i` in the order of the file. `change` is what fitting to
+    /// pictures asks for, if there was any.
     pub(in crate::packed) fn steps(
         &self,
         i: usize,
@@ -85,14 +90,14 @@ impl Alone {
     }
 }
 
-/// The nearest number of steps.
+/// Returns `x / step`, rounded to the nearest number of steps.
 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
 pub(in crate::packed) fn steps(x: f64, step: f64) -> i32 {
     libm::rint(x / step).clamp(-MOST_STEPS, MOST_STEPS) as i32
 }
 
-/// Returns for each Gaussian before `first` the ratio `sum / own`. `own` is its opacity times its area. `sum` is that of the
-/// Gaussians from `first` on that are nearer to it than to any other before `first`.
+/// Returns the ratio `sum / own` for each Gaussian before `first`. `own` is its opacity times its area. `sum` is the
+/// opacity times area of all Gaussians from `first` on to which it is the nearest one before `first`.
 fn missing(g: &Geometry, places: &[MortonKey], first: usize) -> Vec<f64> {
     let area = |place: &MortonKey| {
         let mut scales = g.scales[place.index()];
@@ -102,7 +107,7 @@ fn missing(g: &Geometry, places: &[MortonKey], first: usize) -> Vec<f64> {
     let area: Vec<f32> = places.iter().map(area).collect();
     let mass = |i: usize| f64::from(log_sigmoid(g.opacities[places[i].index()]).exp() * area[i]);
     let (ours, others) = places.split_at(first.min(places.len()));
-    // In the order of cells, which each layer is in.
+    // Each layer is in the order of cells, but several layers one after the other are not.
     let mut near: Vec<usize> = (0..ours.len()).collect();
     near.sort_by_key(|&i| ours[i].cell);
     let mut sums = vec![0.0_f64; ours.len()];

@@ -18,19 +18,20 @@ pub struct Appearance {
     pub log_opacity: f32,
 }
 
-/// By how much the look of a Gaussian changes.
+/// The change of the appearance and the size of a Gaussian.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AppearanceChange {
-    /// SH coefficients of degree 0.
+    /// Change of the SH coefficients of degree 0.
     pub dc: [f32; 3],
-    /// Natural logarithm of the opacity after the sigmoid.
+    /// Change of the natural logarithm of the opacity after the sigmoid.
     pub log_opacity: f32,
-    /// Natural logarithms of all scales.
+    /// Change of the natural logarithms of all scales.
     pub log_scale: f32,
 }
 
 impl AppearanceChange {
-    /// The nearest change of scales and of the opacity that a file holds.
+    /// Rounds the changes of scales and of the opacity to the nearest ones that a file holds. The change of the base colour
+    /// stays.
     #[must_use]
     pub fn rounded(self) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "to single precision")]
@@ -39,7 +40,7 @@ impl AppearanceChange {
         Self { log_opacity, log_scale, ..self }
     }
 
-    /// Makes the change to Gaussian `i` of `geometry`. The logarithm of the opacity is then not above -0.0001.
+    /// Applies the change to Gaussian `i` of `geometry`. The logarithm of its opacity is then at most -0.0001.
     ///
     /// # Panics
     /// If there is no Gaussian `i`.
@@ -62,7 +63,7 @@ impl AppearanceChange {
 }
 
 impl Appearance {
-    /// That of Gaussian `i` of `geometry`. The logarithm of its opacity is not below -100.
+    /// Returns the appearance of Gaussian `i` of `geometry`. A logarithm of its opacity below -100 becomes -100.
     ///
     /// # Panics
     /// If there is no Gaussian `i`.
@@ -71,7 +72,7 @@ impl Appearance {
         Self { dc: geometry.dc[i], log_opacity: log_sigmoid(geometry.opacities[i]).max(MIN_LOG_OPACITY) }
     }
 
-    /// Gives it to Gaussian `i` of `geometry`. The logarithm of the opacity is then not above -0.0001.
+    /// Sets the appearance of Gaussian `i` of `geometry`. The logarithm of its opacity is then at most -0.0001.
     ///
     /// # Panics
     /// If there is no Gaussian `i`.

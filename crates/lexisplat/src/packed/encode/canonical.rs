@@ -7,19 +7,20 @@ use crate::packed::bitstream::parameters::Parameters;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, columns, cross, dot, log_sigmoid, longest_first};
 
-/// Largest logarithm of the ratio of the longest axis to the thinnest. Thinner ellipsoids look the same, since
-/// pictures blur by 0.3 squared pixels.
+/// Largest logarithm of the ratio of the longest axis to another. Thinner ellipsoids look the same, since pictures blur by
+/// 0.3 squared pixels.
 const MAX_THINNESS: f32 = 9.0;
-/// Largest magnitude of the logarithm of a standard deviation. Beyond it exp leaves f32.
+/// Largest magnitude of the logarithm of a standard deviation. The exponential of a larger one leaves f32.
 const MAX_LOG_SCALE: f32 = 40.0;
-/// Half the logarithm of the largest f32. The variance of a larger scale leaves f32, and no rasteriser draws the
-/// Gaussian. With its scale limited to [`MAX_LOG_SCALE`] it might be drawn, so it is made invisible.
+/// Half the logarithm of the largest f32. The variance of a larger scale leaves f32, and no rasteriser draws such a
+/// Gaussian. A file limits the scale to [`MAX_LOG_SCALE`], with which the Gaussian might be drawn, so its opacity becomes
+/// the smallest one.
 const MAX_DRAWN_LOG_SCALE: f32 = 44.361_42;
 /// Smallest logarithm of an opacity. The exponential of a smaller one is about 0 in f32.
 pub(in crate::packed) const MIN_LOG_OPACITY: f32 = -100.0;
-/// Smallest logarithm of an opacity, of 2^-23. No picture shows less.
+/// Smallest logarithm of an opacity: about that of 2^-23. No picture shows smaller opacities.
 const LEAST_LOG_OPACITY: f32 = -16.0;
-/// Largest absolute value.
+/// Largest absolute value of an integer that stands for a value.
 const MOST_VALUE: f64 = (1_u32 << 26) as f64;
 
 /// One Gaussian in canonical form.
@@ -27,9 +28,9 @@ const MOST_VALUE: f64 = (1_u32 << 26) as f64;
 pub(in crate::packed) struct Canonical {
     /// Natural logarithms of the standard deviations, longest first.
     pub(in crate::packed) scales: Vec3,
-    /// The axis of the source that each is.
+    /// The axis of the source that each of `scales` belongs to.
     pub(in crate::packed) order: [usize; 3],
-    /// In that order, right-handed.
+    /// The directions of the axes in the order of `scales`, as a right-handed system.
     pub(in crate::packed) axes: [Vec3; 3],
     pub(in crate::packed) position: Vec3,
     /// Natural logarithm of the opacity after the sigmoid.
@@ -37,13 +38,13 @@ pub(in crate::packed) struct Canonical {
     pub(in crate::packed) dc: Vec3,
 }
 
-/// Gaussian `i` in canonical form.
+/// Returns Gaussian `i` in canonical form.
 pub(in crate::packed) fn canonical(geometry: &Geometry, i: usize) -> Canonical {
     let scales = geometry.scales[i];
     let order = longest_first(scales);
     let given = columns(geometry.rotations[i]);
     let [first, second, third] = order.map(|k| given[k]);
-    // An ellipsoid does not change when an axis is reversed.
+    // An ellipsoid does not change when one of its axes is reversed.
     let third = if dot(cross(first, second), third) < 0.0 { third.map(|v| -v) } else { third };
     let drawn = scales[order[0]] <= MAX_DRAWN_LOG_SCALE;
     let log_opacity = if drawn { log_sigmoid(geometry.opacities[i]) } else { MIN_LOG_OPACITY };
@@ -58,7 +59,7 @@ pub(in crate::packed) fn canonical(geometry: &Geometry, i: usize) -> Canonical {
     }
 }
 
-/// `x` as a value.
+/// Returns `x` as a multiple of `2^-VALUE_BITS`, rounded to nearest.
 fn value(x: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "clamped")]
     let value = libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(-MOST_VALUE, MOST_VALUE) as i32;

@@ -1,4 +1,4 @@
-//! Coding of one chunk, and everything that all chunks of a file are coded with.
+//! Coding of one chunk, and the parameters and the dictionary with which all chunks of a file are coded.
 
 use half::f16;
 
@@ -21,29 +21,29 @@ use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 use crate::support::rng::SplitMix64;
 
-/// Largest number of rows to learn a dictionary from.
+/// Largest number of rows that a dictionary is learned from.
 pub(in crate::packed) const SAMPLE: usize = 24_576;
-/// Most rows that decide how finely atoms are rounded.
+/// Largest number of rows that decide how finely atoms are rounded.
 const ATOM_BITS_SAMPLE: usize = 2048;
-/// Gaussians that pay for one more atom.
+/// Number of Gaussians that justify one more atom.
 const GAUSSIANS_PER_ATOM: usize = 64;
-/// Largest number of atoms that are learned by default: as many as one byte counts. Files without the fixed atoms have at least
-/// as many learned atoms as a row has coefficients, since fewer do not span the rows.
+/// Largest number of atoms that are learned by default. One byte can hold their indices. Files without the fixed atoms have
+/// at least as many learned atoms as a row has coefficients, since fewer do not span the rows.
 const MAX_LEARNED: usize = 256;
-/// Scenes that pay for fewer atoms than this many times the coefficients of a row choose among several numbers of them.
+/// A scene that justifies fewer atoms than this times the coefficients of a row chooses among several numbers of atoms.
 const CHOICE: usize = 2;
-/// Place of the step of values among the factors of parameters.
+/// Index of the step of SH values among the factors of [`Parameters`].
 pub(in crate::packed) const VALUES: usize = 1;
-/// Steps of atoms' coefficients are 2^-k for k up to this.
+/// Largest `k` of the steps `2^-k` of atoms' coefficients.
 const MAX_ATOM_BITS: u32 = 14;
-/// Rounding steps of a coefficient of an atom, for each step of an average value.
+/// Number of rounding steps of an atom's coefficient in one value step, for each step of the root mean square of values.
 const ATOM_STEPS_PER_VALUE: f64 = 10.0;
 /// Step of SH values as a share of a promised tolerance.
 const VALUE_STEP_PER_TOLERANCE: f64 = 0.35;
-/// Share of the squared tolerance that the pursuit may use. The rest is for rounding to f16.
+/// Share of the squared tolerance that the pursuit may use. Rounding to f16 takes up to the rest.
 const TOLERANCE_SHARE: f32 = 0.995;
-/// A row whose code has a larger error than this, the largest f16, is stored exactly, with or without a
-/// promised tolerance.
+/// Largest error of a code: the largest f16. A row whose code has a larger error is stored exactly, also without a promised
+/// tolerance.
 const MAX_ERROR: f64 = 65_504.0;
 /// Mixed into the seed of the sample.
 pub(in crate::packed) const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
@@ -52,23 +52,23 @@ pub(in crate::packed) const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 #[derive(Debug, Clone, Copy)]
 pub(in crate::packed) struct OrderedGaussians<'a> {
     pub(in crate::packed) splats: &'a Splats,
-    /// For each Gaussian its index in `splats` and its cell.
+    /// The index in `splats`, and the cell, of each Gaussian.
     pub(in crate::packed) scene: &'a [MortonKey],
-    /// Colour and shape class of each, in this order.
+    /// The colour class and the shape class of each Gaussian of `scene`.
     pub(in crate::packed) classes: &'a [[u8; 2]],
-    /// What each shows, in this order, instead of the base colours and opacities of `splats`.
+    /// The appearance of each Gaussian of `scene`, instead of the base colours and opacities of `splats`.
     pub(in crate::packed) appearances: Option<&'a [Appearance]>,
-    /// By how much each of the first layer is to change while the second is not there, beside its growth.
+    /// The interim change of each Gaussian of the first layer, in addition to its growth.
     pub(in crate::packed) changes: Option<&'a [AppearanceChange]>,
 }
 
 impl<'a> OrderedGaussians<'a> {
-    /// Gaussians that show what they are.
+    /// Creates a view of Gaussians with their own base colours and opacities, without interim changes.
     pub(in crate::packed) fn new(splats: &'a Splats, scene: &'a [MortonKey], classes: &'a [[u8; 2]]) -> Self {
         Self { splats, scene, classes, appearances: None, changes: None }
     }
 
-    /// Gaussians `range`.
+    /// Returns the Gaussians `range`. `changes` stays whole, so it is indexed from the first Gaussian of the file.
     pub(in crate::packed) fn part(self, range: std::ops::Range<usize>) -> Self {
         Self {
             splats: self.splats,
@@ -87,7 +87,7 @@ impl<'a> OrderedGaussians<'a> {
         self.splats.rest(self.scene[i].index())
     }
 
-    /// The rows of Gaussians `indices` in units of their value steps, and their colour classes.
+    /// Returns the rows of the Gaussians `indices` in units of their value steps, and their colour classes.
     pub(in crate::packed) fn scaled(
         self,
         indices: impl Iterator<Item = usize>,
@@ -105,7 +105,7 @@ impl<'a> OrderedGaussians<'a> {
     }
 }
 
-/// Everything that all chunks are coded with.
+/// The parameters and the dictionary with which all chunks are coded.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct ChunkCoder {
     pub(in crate::packed) parameters: Parameters,
@@ -117,7 +117,7 @@ pub(in crate::packed) struct ChunkCoder {
 }
 
 impl ChunkCoder {
-    /// Learns from the Gaussians of `view`, a whole scene, how to code them. Returns also the atoms.
+    /// Learns a coder from the Gaussians of `view`, which is a whole scene. Returns the atoms too.
     pub(in crate::packed) fn new(
         view: OrderedGaussians<'_>,
         mut parameters: Parameters,
@@ -138,7 +138,7 @@ impl ChunkCoder {
         Ok((coder, atoms))
     }
 
-    /// A coder that has learned these atoms, and what symbols cost.
+    /// Creates a coder of learned `atoms`. `costs` are the costs of symbols.
     pub(in crate::packed) fn learned(
         parameters: Parameters,
         mean_view: MeanView,
@@ -155,14 +155,14 @@ impl ChunkCoder {
         Ok(Self { parameters, dictionary, mean_view, book, stop, tolerance })
     }
 
-    /// The codes of all of `view`; none for scenes without SH-rest.
+    /// Returns the codes of all Gaussians of `view`; none for scenes without SH-rest.
     pub(in crate::packed) fn codes(&self, view: OrderedGaussians<'_>) -> Codes {
         let Some(book) = &self.book else { return Codes::default() };
         let (rows, classes) = view.scaled(0..view.len(), &self.parameters);
         book.encode(&rows, &classes, self.stop)
     }
 
-    /// What is to be coded of all of `view`, and its counts. Base colours are in units of `dc_unit`.
+    /// Returns the targets of all Gaussians of `view`, and counts of their codes. Base colours are in units of `dc_unit`.
     pub(in crate::packed) fn targets(
         &self,
         view: OrderedGaussians<'_>,
@@ -216,17 +216,18 @@ impl ChunkCoder {
     }
 }
 
-/// What a dictionary is learned for.
+/// The task of learning a dictionary.
 pub(in crate::packed) struct Learning<'a> {
     pub(in crate::packed) degree: ShDegree,
-    /// Number of Gaussians that will be coded.
+    /// Number of Gaussians that are coded with the dictionary.
     pub(in crate::packed) total: usize,
     pub(in crate::packed) stop: StopRule,
     pub(in crate::packed) options: &'a PackOptions,
 }
 
 impl Learning<'_> {
-    /// Learns from a sample of rows, in units of their value steps and in random order, and their colour classes.
+    /// Learns a dictionary from a sample of rows and their colour classes. The rows are in units of their value steps and
+    /// in random order.
     ///
     /// # Errors
     /// [`Error::Cancelled`] if `progress` cancels.
@@ -239,7 +240,7 @@ impl Learning<'_> {
         let Self { degree, total, stop, options } = *self;
         let dim = degree.rest();
         if dim == 0 || rows.is_empty() {
-            // A file has at least one atom.
+            // A file of any degree has at least one atom in memory, also without rows to learn from.
             let first: Vec<f32> = unit_axis(dim, 0).collect();
             let atoms = WholeAtoms::new(degree, &first, 0, false);
             return Ok(Choice { atoms, costs: Costs::initial(1, dim), step: 1.0 });
@@ -257,7 +258,8 @@ impl Learning<'_> {
         Ok(Choice { atoms: WholeAtoms::new(degree, &learned, bits, false), costs, step: 1.0 })
     }
 
-    /// How finely atoms are rounded that code these rows. Errors of atoms show more with larger values.
+    /// Returns the number of bits to which atoms are rounded, for `rows` and the dictionary `atoms`. Larger values enlarge
+    /// the errors of atoms, so they ask for more bits.
     fn atom_bits(&self, rows: &[f32], classes: &[u8], atoms: &[f32], costs: &Costs) -> u32 {
         let book = Codebook::new(self.degree.rest(), atoms.to_vec(), costs.clone());
         let codes = book.encode(rows, classes, self.stop);
@@ -275,7 +277,7 @@ impl Learning<'_> {
     }
 }
 
-/// Sets the step of values that keeps a promised `tolerance`. Returns when a code is good enough.
+/// Sets the step of values that keeps a promised `tolerance`, if there is one. Returns the rule by which a pursuit stops.
 pub(in crate::packed) fn promise(parameters: &mut Parameters, tolerance: Option<f64>) -> StopRule {
     let Some(tol) = tolerance else { return StopRule::Balanced };
     let step = tol * VALUE_STEP_PER_TOLERANCE;
@@ -288,14 +290,14 @@ pub(in crate::packed) fn promise(parameters: &mut Parameters, tolerance: Option<
     StopRule::Error(share * TOLERANCE_SHARE)
 }
 
-/// Number of atoms that a scene of `total` Gaussians learns, if it does not choose among several.
+/// Returns the number of atoms that a scene of `total` Gaussians learns if it does not choose among several numbers.
 fn atoms_to_learn(total: usize, dim: usize, options: &PackOptions) -> usize {
-    // More atoms take fewer bits than exact rows to keep a promised tolerance.
+    // To keep a promised tolerance, more atoms take fewer bits than exact rows.
     let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
     options.atoms.unwrap_or_else(|| (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED).max(fewest))
 }
 
-/// A code as it is kept in memory: by ascending atom, values in f16.
+/// Writes `code` to `out` as it is kept in memory: in ascending order of atoms, with values in f16.
 fn resident(code: &[(u16, i32)], step: f32, out: &mut Vec<(u16, f16)>) {
     out.clear();
     #[expect(clippy::cast_precision_loss, reason = "f16 keeps less")]

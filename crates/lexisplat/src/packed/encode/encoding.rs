@@ -1,4 +1,5 @@
-//! The encoder of packed scenes: chunks are counted, tables made of the counts, and chunks coded with them.
+//! The encoder of packed scenes: it counts the symbols of all chunks, makes tables of the counts, and codes the chunks with
+//! them.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +23,7 @@ use crate::support::limits::Limits;
 use crate::support::spill::{Spill, SpillTo, Woven};
 use crate::support::stopwatch::Stopwatch;
 
-/// What is counted over chunks before any is coded.
+/// The counts of symbols over chunks, which are taken before any chunk is coded.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Counts {
     tally: Tally,
@@ -31,7 +32,7 @@ pub(crate) struct Counts {
 }
 
 impl Counts {
-    /// The counts of one chunk or of the dictionary.
+    /// Counts the symbols and the raw bits of one chunk or of the dictionary.
     pub(in crate::packed) fn of<'r>(
         tally: Tally,
         ranges: impl IntoIterator<Item = &'r SymbolRecorder>,
@@ -47,14 +48,14 @@ impl Counts {
         Self { tally, histograms, raw_bits }
     }
 
-    /// Adds the counts of other chunks.
+    /// Adds the counts `other` of other chunks.
     pub(in crate::packed) fn add(&mut self, other: &Self) {
         self.tally.add(&other.tally);
         self.histograms.iter_mut().zip(&other.histograms).for_each(|(sum, more)| sum.merge(more));
         self.raw_bits.add(&other.raw_bits);
     }
 
-    /// Bits of all streams.
+    /// Returns the number of bits of each stream if it is coded with `tables`.
     fn bits(&self, tables: &Tables) -> BitCounts {
         let mut bit_counts = self.raw_bits.clone();
         for (context, histogram) in self.histograms.iter().enumerate() {
@@ -72,7 +73,7 @@ pub(in crate::packed) struct Written {
     cell: u64,
     bounds: [[f32; 3]; 2],
     energy: f64,
-    /// The bytes of each range, and the checksum of its integers.
+    /// The bytes of each range, and the checksum of the integers that it decodes to.
     pub(in crate::packed) ranges: Vec<(Vec<u8>, u32)>,
 }
 
@@ -90,7 +91,8 @@ impl Written {
         }
     }
 
-    /// The same chunk coded with `tables`. Its ranges are coded with those of `lookup`. `None` if no encoder writes them.
+    /// Returns the same chunk coded with `tables`. Its ranges are now coded with the tables of `lookup`. `None` if the
+    /// ranges are not the output of an encoder, or if `tables` lack one of their symbols.
     pub(in crate::packed) fn recoded(
         &self,
         form: &Form,
@@ -110,9 +112,9 @@ impl Written {
     }
 }
 
-/// Takes the next chunk of a layer.
+/// A function that takes the next coded chunk of its layer.
 pub(in crate::packed) type WriteChunk<'a> = dyn FnMut(Written) -> Result<()> + 'a;
-/// Codes all chunks with the tables.
+/// A function that codes all chunks with the given tables.
 type CodeChunks<'a> = dyn FnMut(&Tables, &mut WriteChunk<'_>) -> Result<()> + 'a;
 
 /// A scene that is being packed.
@@ -125,11 +127,11 @@ pub(in crate::packed) struct Encoding {
     pub(in crate::packed) form: Form,
     pub(in crate::packed) counts: Counts,
     learn_seconds: f64,
-    /// Runs since learning began.
+    /// Runs since the start of learning.
     clock: Stopwatch,
 }
 
-/// A packed scene, its bulk spilled.
+/// A packed scene whose data are in spill files.
 pub(in crate::packed) struct Finished {
     pub(in crate::packed) head: PackedHead,
     pub(in crate::packed) data: Woven,
@@ -137,8 +139,8 @@ pub(in crate::packed) struct Finished {
 }
 
 impl Encoding {
-    /// Begins with a coder that has learned since the start of `clock`, and its atoms. `most_dc` is the
-    /// largest coordinate of a base colour.
+    /// Creates an encoding. The coder and its atoms were learned since the start of `clock`. `most_dc` is the largest
+    /// coordinate of a base colour.
     pub(in crate::packed) fn new(
         (coder, atoms): (ChunkCoder, WholeAtoms),
         layering: Layering,
@@ -157,12 +159,12 @@ impl Encoding {
         Self { coder, layering, head, form, counts, learn_seconds: clock.seconds(), clock }
     }
 
-    /// Counts all time so far as time spent on learning.
+    /// Counts all time up to this call as time spent on learning.
     pub(in crate::packed) fn end_learning(&mut self) {
         self.learn_seconds = self.clock.seconds();
     }
 
-    /// Codes everything, when all chunks of the `gaussians` Gaussians are counted.
+    /// Codes all chunks. All chunks of the `gaussians` Gaussians must be counted.
     pub(in crate::packed) fn finish(
         self,
         gaussians: usize,
@@ -177,7 +179,7 @@ impl Encoding {
         self.assemble(gaussians, options, meta, &tables, ranges)
     }
 
-    /// Makes the head of the file, when all chunks of the `gaussians` Gaussians are counted and coded with `tables`.
+    /// Makes the head of the file. All chunks of the `gaussians` Gaussians must be counted and coded with `tables`.
     pub(in crate::packed) fn assemble(
         self,
         gaussians: usize,
@@ -227,24 +229,24 @@ impl Encoding {
 }
 
 impl Tables {
-    /// The tables of what was counted.
+    /// Makes the tables for the counted symbols.
     pub(in crate::packed) fn of(counts: &Counts) -> Result<Self> {
         Self::new(&counts.histograms).ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))
     }
 }
 
-/// The coded ranges of chunks, in the order in which they come.
+/// The coded ranges of chunks, in the order in which [`Self::push`] takes them.
 #[derive(Debug)]
 pub(in crate::packed) struct Ranges {
     spill: Spill,
-    /// Where the next range starts.
+    /// The place in the spill where the next range starts.
     at: u64,
-    /// The chunks, with what pictures change by without each. Their ranges say where they start in the spill.
+    /// Each chunk, and the squared change of pictures without it. The starts of its ranges are places in the spill.
     chunks: Vec<(Chunk, f64)>,
 }
 
 impl Ranges {
-    /// None yet.
+    /// Creates an empty list of ranges that spills to `to`.
     pub(in crate::packed) fn new(to: SpillTo<'_>) -> Result<Self> {
         Ok(Self { spill: Spill::new(to)?, at: 0, chunks: Vec::new() })
     }

@@ -1,4 +1,4 @@
-//! Steps and predictors fitted to a scene.
+//! Steps and predictors, fitted to a scene.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,52 +13,54 @@ use crate::scene::sh::C0;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, at_share};
 
-/// Smallest weight, as a share of the 90th percentile of weights. Other views may show Gaussians that the measured
-/// ones did not.
+/// Floor of weights, as a share of the 90th percentile of weights. Other views may show Gaussians that the measured views
+/// did not.
 const WEIGHT_FLOOR: f64 = 1e-3;
 const FLOOR_QUANTILE: f64 = 0.9;
-/// Weights above this quantile do not make the finest class finer.
+/// Quantile of weights from which class 0 is set. Larger weights do not make its steps finer.
 const TOP_QUANTILE: f64 = 0.9995;
-/// Gaussians with weights below this quantile are left out when the dependence of steps on shape is fitted.
+/// Quantile of weights below which Gaussians do not count when the dependence of steps on shape is fitted.
 const FIT_QUANTILE: f64 = 0.05;
-/// Added to squared derivatives before their logarithm is taken, as a share of the one by opacity.
+/// Added to the squared derivative by scale, rotation or position before its logarithm is taken, as a share of that by
+/// opacity.
 const DERIVATIVE_FLOOR: f64 = 1e-4;
-/// Factors on the steps of colour, SH values, opacity, scale, rotation and position, found by trial. Derivatives
-/// hold for small errors, and the errors of packing are not small (docs/METHOD.md).
+/// Factors on the steps of colour, SH values, opacity, scale, rotation and position, found by trial. Derivatives hold for
+/// small errors, and the errors of packing are not small (docs/METHOD.md).
 const DC_FACTOR: f32 = 1.6;
 const VALUE_FACTOR: f32 = 1.1;
 const OPACITY_FACTOR: f32 = 1.8;
 const SCALE_FACTOR: f64 = 1.1;
 const ROTATION_FACTOR: f64 = 0.8;
 const POSITION_FACTOR: f64 = 1.12;
-/// Smallest and largest step of class 0. Values around 1 have no finer digits in f32, and with the largest step
-/// a value is as good as unknown.
+/// Smallest and largest step of class 0. Values around 1 have no finer digits in f32. With the largest step a value is as
+/// good as unknown.
 const STEPS: [f64; 2] = [1.0 / 16_777_216.0, 1e6];
-/// Keeps the normal equations solvable.
+/// Ridge of the normal equations, relative to their diagonal. It keeps them solvable.
 const RIDGE: f64 = 1e-6;
-/// Growth of the ridge while coefficients are too large.
+/// Factor on the ridge, applied while coefficients are too large.
 const RIDGE_GROWTH: f64 = 4.0;
 /// Largest slope of the logarithm of a step. Files hold slopes below 8.
 const MOST_SLOPE: f64 = 7.9;
 
-/// Everything but the overall step.
+/// The fit of a scene: everything but the overall step.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Fit {
     pub(in crate::packed) steps: Steps,
-    /// Colour and shape class of each Gaussian before they are rounded.
+    /// The colour class and the shape class of each Gaussian, before rounding.
     pub(in crate::packed) classes: Vec<[f32; 2]>,
 }
 
-/// Steps and predictors of a scene, but for the overall step.
+/// The steps and predictors of a scene, relative to the overall step.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::packed) struct Steps {
     pub(in crate::packed) parameters: Parameters,
-    /// How weights become classes of colour and of shape.
+    /// The classes of weights for colour and for shape.
     kinds: [Classes; 2],
 }
 
 impl Fit {
-    /// `scene` is the order of the Gaussians of `geometry`.
+    /// Fits steps and predictors. `scene` is the order in which the Gaussians of `geometry` are coded, and `dc` their base
+    /// colours.
     pub(in crate::packed) fn new(
         geometry: &Geometry,
         dc: &[Vec3],
@@ -80,7 +82,7 @@ impl Fit {
 }
 
 impl Steps {
-    /// Steps without predictors.
+    /// Creates steps without predictors.
     pub(in crate::packed) fn new(
         grid: &Grid,
         kinds: [Classes; 2],
@@ -95,7 +97,7 @@ impl Steps {
                 DC_FACTOR / C0,
                 VALUE_FACTOR / C0,
                 OPACITY_FACTOR,
-                // The steps of scales depend on nothing: no scale is decoded before them.
+                // The steps of scales do not depend on scales, because no scale is decoded before them.
                 single(libm::exp2(scale_rows[0][0])),
                 single(libm::exp2(scale_rows[1][0])),
                 single(libm::exp2(scale_rows[2][0])),
@@ -109,13 +111,14 @@ impl Steps {
         Self { parameters, kinds }
     }
 
-    /// Colour and shape class, before they are rounded, of Gaussians of these sensitivities to colour and opacity.
+    /// Returns the colour class and the shape class of each Gaussian, before rounding. `weights` are its sensitivities to
+    /// colour and opacity.
     pub(in crate::packed) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
         weights.iter().map(|w| [self.kinds[0].of(w[0]), self.kinds[1].of(w[1])]).collect()
     }
 
-    /// The parameters for an overall step: about the square root of the mean squared error of pictures
-    /// that one value of one Gaussian may make.
+    /// Returns the parameters for the overall step `step`. It is about the square root of the mean squared error of
+    /// pictures that one value of one Gaussian may cause.
     pub(in crate::packed) fn with_step(&self, step: f64) -> Parameters {
         let base = |unit: f64| single((unit * step).clamp(STEPS[0], STEPS[1]));
         Parameters { base: self.kinds.map(|k| base(k.unit())), ..self.parameters.clone() }
@@ -133,54 +136,54 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     at_share(&sorted, share)
 }
 
-/// Classes of steps: halving from one to the next, in proportion to 1 / sqrt(weight).
+/// The classes of steps of a scene. A class has the step `2^class / 2^top`, which is about `1 / sqrt(weight)`.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(in crate::packed) struct Classes {
-    /// Added to every weight.
+    /// Added to every weight before its logarithm is taken.
     floor: f64,
-    /// Half the binary logarithm of the weight of class 0.
+    /// Half the binary logarithm of the weight of class 0, a whole number.
     top: f64,
 }
 
 impl Classes {
-    /// The classes for a scene whose weights are like these.
+    /// Fits classes to a list of weights.
     fn fit(weights: impl Iterator<Item = f32>) -> Self {
         let mut weights: Vec<f64> = weights.map(f64::from).collect();
         weights.sort_by(f64::total_cmp);
         Self::of_quantiles(|share| at_share(&weights, share))
     }
 
-    /// The classes for a scene of which these are the weights.
+    /// Fits classes to a histogram of weights.
     pub(in crate::packed) fn of_histogram(weights: &Histogram) -> Self {
         Self::of_quantiles(|share| weights.quantile(share).into())
     }
 
-    /// The classes for weights with these quantiles.
+    /// Fits classes to weights with these quantiles.
     fn of_quantiles(quantile: impl Fn(f64) -> f64) -> Self {
         let floor = (quantile(FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
         let top = 0.5 * libm::log2(quantile(TOP_QUANTILE) + floor);
         Self { floor, top: top.round() }
     }
 
-    /// The class of a weight, before it is rounded.
+    /// Returns the class of a weight, before rounding.
     fn of(self, weight: f32) -> f32 {
         single(self.top - 0.5 * libm::log2(f64::from(weight) + self.floor))
     }
 
-    /// The step of class 0 for an overall step of 1.
+    /// Returns the step of class 0 at an overall step of 1.
     fn unit(self) -> f64 {
         libm::exp2(-self.top)
     }
 }
 
-/// The nearest class.
+/// Rounds a class to the nearest one that a file holds.
 pub(in crate::packed) fn rounded(class: f32) -> u8 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
     let class = class.round().clamp(0.0, f32::from(LAST_CLASS)) as u8;
     class
 }
 
-/// Mean base colour and its principal axes, strongest first.
+/// Returns the mean base colour and the principal axes of base colours, strongest first.
 fn colour_axes(dc: &[Vec3], scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
     let dc = || scene.iter().map(|g| dc[g.index()]);
     let n = scene.len().max(1) as f64;
@@ -190,7 +193,7 @@ fn colour_axes(dc: &[Vec3], scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
     (mean, rounded_of(&crate::sparse::learn::principal_axes(3, &deviations)))
 }
 
-/// Axes as a file holds them.
+/// Rounds axes to those that a file holds.
 fn rounded_of(axes: &[Vec<f64>]) -> [Vec3; 3] {
     let mut out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for (row, axis) in out.iter_mut().zip(axes) {
@@ -199,7 +202,7 @@ fn rounded_of(axes: &[Vec<f64>]) -> [Vec3; 3] {
     rounded_axes(&out)
 }
 
-/// Sums of base colours and of their products.
+/// Sums of base colours and of products of their channels.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(in crate::packed) struct ColourMoments {
     count: u64,
@@ -220,7 +223,7 @@ impl ColourMoments {
         }
     }
 
-    /// Adds the sums of other Gaussians.
+    /// Adds the sums `other` of other Gaussians.
     pub(in crate::packed) fn merge(&mut self, other: &Self) {
         self.count += other.count;
         for i in 0..3 {
@@ -231,7 +234,7 @@ impl ColourMoments {
         }
     }
 
-    /// Mean base colour and its principal axes, strongest first.
+    /// Returns the mean base colour and the principal axes of base colours, strongest first.
     pub(in crate::packed) fn axes(&self) -> (Vec3, [Vec3; 3]) {
         let n = self.count.max(1) as f64;
         let mean = self.sums.map(|sum| sum / n);
@@ -241,8 +244,8 @@ impl ColourMoments {
     }
 }
 
-/// What the binary logarithm of the steps of scaling, turning and moving along each axis, relative to the step of the
-/// opacity, is as a linear function of 1 and the scales. The steps of scaling are constant.
+/// Fits of the binary logarithm of steps, relative to the step of the opacity: for scaling, turning and moving, along each
+/// axis. The logarithm is linear in 1 and the three scales. For scaling it is constant.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::packed) struct Derivatives([[Equations<4>; 3]; 3]);
 
@@ -253,7 +256,7 @@ impl Default for Derivatives {
 }
 
 impl Derivatives {
-    /// Adds the Gaussians of `scene`, but those of the smallest weights.
+    /// Adds the Gaussians of `scene`. Those with the smallest weights do not count.
     pub(in crate::packed) fn add(
         &mut self,
         geometry: &Geometry,
@@ -268,7 +271,7 @@ impl Derivatives {
             let by_axis = by_axis(sensitivity, placed.index(), &g);
             let scales = g.scales.map(f64::from);
             for (kind, equations) in self.0.iter_mut().enumerate() {
-                // Positions are measured in standard deviations for the floor.
+                // For the floor, positions are measured in standard deviations along the longest axis.
                 let unit = if kind == POSITION { libm::exp(-2.0 * scales[0]) } else { 1.0 };
                 let features = match kind {
                     SCALE => [1.0, 0.0, 0.0, 0.0],
@@ -282,7 +285,7 @@ impl Derivatives {
         }
     }
 
-    /// Adds the sums of other Gaussians.
+    /// Adds the sums `other` of other Gaussians.
     pub(in crate::packed) fn merge(&mut self, other: &Self) {
         let own = self.0.as_flattened_mut().iter_mut();
         own.zip(other.0.as_flattened()).for_each(|(sum, more)| sum.merge(more));
@@ -300,12 +303,12 @@ impl Derivatives {
     }
 }
 
-/// Indices of the derivatives by an axis.
+/// Indices into [`Derivatives`].
 const SCALE: usize = 0;
 const ROTATION: usize = 1;
 const POSITION: usize = 2;
 
-/// Sensitivity of Gaussian `i` to scaling, turning and moving along each of its axes in canonical order.
+/// Returns the sensitivities of Gaussian `i` to scaling, turning and moving along each of its axes, in canonical order.
 fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
     let p = sensitivity.position[i];
     let along = |a: Vec3| {
@@ -317,7 +320,7 @@ fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
     [g.order.map(|k| sensitivity.scale[i][k]), g.order.map(|k| sensitivity.rotation[i][k]), g.axes.map(along)]
 }
 
-/// The predictions of the values of a scene before they are rounded.
+/// Sums from which the predictions of values are fitted. The values are not rounded.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::packed) struct Predictors {
     count: u64,
@@ -332,7 +335,8 @@ impl Default for Predictors {
 }
 
 impl Predictors {
-    /// Adds the Gaussians of `scene`, each beside those before it, with their classes before they are rounded.
+    /// Adds the Gaussians of `scene`, with their classes before rounding. A Gaussian is predicted from those before it in
+    /// `scene`.
     pub(in crate::packed) fn add(
         &mut self,
         geometry: &Geometry,
@@ -371,14 +375,14 @@ impl Predictors {
         }
     }
 
-    /// Adds the sums of other Gaussians.
+    /// Adds the sums `other` of other Gaussians.
     pub(in crate::packed) fn merge(&mut self, other: &Self) {
         self.count += other.count;
         self.sums.iter_mut().zip(other.sums).for_each(|(sum, more)| *sum += more);
         self.equations.iter_mut().zip(&other.equations).for_each(|(sum, more)| sum.merge(more));
     }
 
-    /// Puts the predictions into `parameters`.
+    /// Solves for the predictions and stores them in `parameters`.
     pub(in crate::packed) fn solve(&self, parameters: &mut Parameters) {
         let n = self.count.max(1) as f64;
         parameters.means = self.sums.map(|sum| single(sum / n));
@@ -388,7 +392,7 @@ impl Predictors {
     }
 }
 
-/// Least squares by normal equations.
+/// A least-squares fit by normal equations.
 #[derive(Debug, Clone, Copy)]
 struct Equations<const N: usize> {
     matrix: [[f64; N]; N],
@@ -424,14 +428,15 @@ impl<const N: usize> Equations<N> {
         }
     }
 
-    /// Adds the sums of other equations.
+    /// Adds the sums `other` of other equations.
     fn merge(&mut self, other: &Self) {
         let own = self.matrix.as_flattened_mut().iter_mut().chain(&mut self.right);
         own.zip(other.matrix.as_flattened().iter().chain(&other.right)).for_each(|(sum, more)| *sum += more);
     }
 
-    /// The coefficients, those but the first at most `most` in size. Features that hardly vary, or together, have large ones
-    /// that a file cannot hold; with them cut off, what they are to cancel would stay.
+    /// Returns the coefficients. All but the first are at most `most` in size, if a ridge below 1 is enough for that.
+    /// Features that hardly vary, or vary together, have large coefficients of opposite signs, which a file cannot hold. If
+    /// they were cut off, they would not cancel.
     fn solve_within(&self, most: f64) -> [f64; N] {
         let mut ridge = RIDGE;
         loop {
@@ -443,7 +448,7 @@ impl<const N: usize> Equations<N> {
         }
     }
 
-    /// The coefficients; 0 for features that are always 0.
+    /// Returns the coefficients. A feature that is always 0 has the coefficient 0.
     fn solve(&self) -> [f64; N] {
         self.solve_with(RIDGE)
     }
@@ -481,7 +486,7 @@ impl<const N: usize> Equations<N> {
 mod tests {
     use super::*;
 
-    /// Scales of few kinds, which differ together but for a little.
+    /// Features that take few values and vary together but for a little noise.
     #[test]
     fn coefficients_of_features_that_vary_together_are_small() {
         let mut equations = Equations::<4>::NONE;

@@ -1,7 +1,7 @@
-//! The coarsest steps that a visible Gaussian may have, whatever was measured.
+//! The floor: the coarsest steps that a visible Gaussian may have, whatever sensitivity was measured.
 //!
-//! Views that nobody foresaw show what the measured ones did not. The limits here are shares of a Gaussian's own size,
-//! turn, opacity and colour, so that such a view is worse but not broken (docs/METHOD.md, "The floor").
+//! The measured views do not show what other views show. The limits are shares of a Gaussian's own size, turn, opacity and
+//! colour, so that another view may look worse but not broken (docs/METHOD.md, "The floor").
 
 use serde::{Deserialize, Serialize};
 
@@ -14,59 +14,60 @@ use crate::scene::splats::Geometry;
 use crate::support::maths::{exp, exp2, log2};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
-/// Smallest natural logarithm of the opacity, 0.2, of Gaussians that count as visible here.
+/// Natural logarithm of the opacity 0.2. Gaussians of smaller opacity have no limits.
 const VISIBLE: f32 = -1.609_438;
-/// Largest step of the logarithm of the opacity and of the two larger standard deviations.
+/// Largest step of the logarithms of the opacity and of the two larger standard deviations.
 const LOG_STEP: f32 = 0.8;
-/// Largest step of a turn, in radians, in a plane in which one standard deviation is e times the other. Rounder
-/// Gaussians may be turned more, in proportion to the logarithm of that ratio.
+/// Largest step of a turn, in radians. It holds in a plane in which one standard deviation is at least `e` times the other.
+/// In a plane with a smaller ratio the limit is `ANGLE_STEP / ln(ratio)`.
 const ANGLE_STEP: f32 = 0.7;
-/// Largest step of the position along each axis, in standard deviations along it. Along the shortest axis the middle
-/// one counts.
+/// Largest step of the position along each axis, in standard deviations along it. For the shortest axis, the standard
+/// deviation along the middle one counts.
 const POSITION_STEP: f32 = 1.5;
-/// Largest step of a coordinate of the base colour, of which 1 is the range of pictures.
+/// Largest step of a coordinate of the base colour. Colours of pictures range from 0 to 1.
 const COLOUR_STEP: f32 = 0.28;
-/// Most octaves by which the steps of class 0 become smaller for the turn or the position of a single Gaussian, so that
-/// a few odd ones do not make the whole file larger. The most that models in docs/results/promise.md need is 3.
+/// Most octaves by which turns and positions make the steps of class 0 smaller, so that a few unusual Gaussians do not make
+/// the whole file larger. The models in docs/results/promise.md need at most 3.
 const MOST_OCTAVES: f32 = 4.0;
-/// Added to the number of octaves below a limit, so that a step that is the limit but for rounding is within it.
+/// Added to a number of octaves before it is rounded down, so that a step that exceeds its limit by a rounding error only
+/// is within it.
 const EXACT: f32 = 1e-3;
 
-/// Parameters under which the classes of Gaussians can keep the limits.
+/// The limits of steps, and parameters with whose classes all Gaussians can keep them.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::packed) struct Floor {
     pub(in crate::packed) parameters: Parameters,
-    /// What is added to a class of colour and of shape, because the steps of class 0 are others.
+    /// Octaves by which the steps of class 0 were made smaller, for colour and for shape. They are added to classes.
     added: [f32; 2],
     limited: bool,
 }
 
 impl Floor {
-    /// No limits.
+    /// Returns parameters without limits.
     pub(in crate::packed) fn none(parameters: Parameters) -> Self {
         Self { parameters, added: [0.0; 2], limited: false }
     }
 
-    /// Changes the steps of class 0 of `parameters` so that they are within the limits of all of `scene`, and so that
-    /// the steps of a class are the limits themselves.
+    /// Makes the steps of class 0 of `parameters` small enough for all Gaussians of `scene`. Also shifts the steps so that
+    /// those of some class are exactly the limits of colours and logarithms.
     pub(in crate::packed) fn new(parameters: Parameters, geometry: &Geometry, scene: &[MortonKey]) -> Self {
         let floor = Self::begin(parameters);
         let over = floor.over(geometry, scene);
         floor.within(over)
     }
 
-    /// The limits of colours and of logarithms alone.
+    /// Sets the limits of colours and of logarithms, which do not depend on the shapes of Gaussians.
     pub(in crate::packed) fn begin(mut parameters: Parameters) -> Self {
-        // If the limits were between two classes, all Gaussians at a limit would change their steps at once as the
-        // overall step grows.
+        // If a limit were between two classes, all Gaussians at it would change their steps at once as the overall step
+        // grows.
         let over = [colour_over(&parameters), logs_over(&parameters)].map(log2);
         let added = over.map(|over| over - over.round().min(0.0));
         rescale(&mut parameters, added);
         Self { parameters, added, limited: true }
     }
 
-    /// By how many classes the shape of `scene` asks for more than class 0, at least 0. Of several parts of a scene the largest
-    /// number counts.
+    /// Returns by how many octaves the steps of shape class 0 are too large for the Gaussians of `scene`; 0 if they are
+    /// not. For several parts of a scene, the largest of their numbers counts.
     pub(in crate::packed) fn over(&self, geometry: &Geometry, scene: &[MortonKey]) -> f32 {
         let parts = map_chunks(scene.len(), GAUSSIANS_PER_TASK, |range| {
             let coarsest = scene[range].iter().map(|&g| coarsest(&self.parameters, geometry, g)[1]);
@@ -75,7 +76,8 @@ impl Floor {
         -parts.into_iter().fold(0.0, f32::min)
     }
 
-    /// The limits of a scene whose parts are [`Self::over`] by at most `over`.
+    /// Makes the steps of shape class 0 smaller by `over` octaves, at most by [`MOST_OCTAVES`]. `over` is the largest
+    /// result of [`Self::over`] over the parts of a scene.
     pub(in crate::packed) fn within(mut self, over: f32) -> Self {
         let shape = over.min(MOST_OCTAVES);
         rescale(&mut self.parameters, [0.0, shape]);
@@ -83,7 +85,8 @@ impl Floor {
         self
     }
 
-    /// The classes of Gaussians of the same steps as `classes`, or of smaller ones where the limits ask for it.
+    /// Returns the class of each Gaussian: with about the steps of `classes`, or with smaller steps where a limit asks for
+    /// them.
     pub(in crate::packed) fn classes(
         &self,
         classes: &[[f32; 2]],
@@ -104,14 +107,15 @@ impl Floor {
     }
 }
 
-/// Makes the steps of class 0 smaller by `octaves`.
+/// Divides the steps of class 0 by `2^octaves`, for colour and for shape.
 fn rescale(parameters: &mut Parameters, octaves: [f32; 2]) {
     for (base, octaves) in parameters.base.iter_mut().zip(octaves) {
         *base *= exp2(-octaves);
     }
 }
 
-/// The coarsest class of colour and of shape that a Gaussian may have. It is below 0 if class 0 is too coarse.
+/// Returns the coarsest classes of colour and of shape that a Gaussian may have. A class is below 0 if class 0 is too
+/// coarse.
 fn coarsest(parameters: &Parameters, geometry: &Geometry, placed: MortonKey) -> [f32; 2] {
     let g = canonical(geometry, placed.index());
     if g.log_opacity < VISIBLE {
@@ -127,12 +131,12 @@ fn coarsest(parameters: &Parameters, geometry: &Geometry, placed: MortonKey) -> 
     [colour_over(parameters), shape].map(|over| (EXACT - log2(over)).floor())
 }
 
-/// The colour steps of class 0 over the limit.
+/// Returns the step of the base colour at colour class 0 over its limit.
 fn colour_over(parameters: &Parameters) -> f32 {
     parameters.dc_step(0) * C0 / COLOUR_STEP
 }
 
-/// The largest step of class 0 of the opacity and the larger scales, over the limit.
+/// Returns the largest of the steps of the opacity and the two larger scales at shape class 0, over the limit.
 fn logs_over(parameters: &Parameters) -> f32 {
     let [_, _, opacity, first, second, _] = parameters.factors;
     parameters.base[1] * opacity.max(first).max(second) / LOG_STEP
@@ -146,7 +150,7 @@ mod tests {
     use crate::support::maths::{dot, log_sigmoid};
     use crate::{Silent, Splats};
 
-    /// `splats` as a file of this overall step has them.
+    /// Packs and unpacks `splats` with the overall step `step`.
     fn packed(splats: &Splats, sensitivity: &Sensitivity, step: f64, limited: bool) -> Splats {
         let options = PackOptions::default().with_keep_order(true);
         let packer = Packer::new(splats, sensitivity, &options).unwrap();
@@ -155,7 +159,7 @@ mod tests {
         packed.unpack().unwrap().into_splats()
     }
 
-    /// Weights of views that saw every fifth Gaussian, and by which moving and turning hardly shows.
+    /// Returns the weights of views that saw every fifth Gaussian. Moving and turning a Gaussian hardly shows in them.
     fn misleading(splats: &Splats) -> Sensitivity {
         let mut s = Sensitivity::guess(&splats.geometry);
         for i in 0..splats.len() {
@@ -168,8 +172,8 @@ mod tests {
         s
     }
 
-    /// How far `found` is from `splats`, the most of visible Gaussians: in the logarithms of opacity and of the larger
-    /// scales, in colour, in position, and in the turn of the longest axis.
+    /// Returns the largest error of a visible Gaussian of `found`: of the logarithms of the opacity and the larger scales,
+    /// of the colour, of the position in standard deviations, and of the turn of a long longest axis.
     fn most_off(splats: &Splats, found: &Splats) -> [f32; 4] {
         let (a, b) = (&splats.geometry, &found.geometry);
         let mut most = [0.0_f32; 4];
@@ -200,10 +204,10 @@ mod tests {
         let misleading = misleading(&splats);
         for step in [1e-4, 1e-3, 1e-2] {
             let most = most_off(&splats, &packed(&splats, &misleading, step, true));
-            // docs/METHOD.md states these.
+            // docs/METHOD.md states these limits.
             let limits = [0.47, 0.29, 1.0, 0.7];
             assert!(std::iter::zip(most, limits).all(|(most, limit)| most <= limit), "{step}: {most:?}");
-            // With them the file is not much finer than they ask.
+            // Under the limits the errors are not much smaller than they may be.
             assert!(most[0] > 0.2 && most[2] > 0.5, "{step}: {most:?}");
             let without = most_off(&splats, &packed(&splats, &misleading, step, false));
             assert!([0, 1, 3].iter().all(|&k| without[k] > limits[k]), "{step}: {without:?}");

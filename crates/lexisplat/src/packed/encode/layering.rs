@@ -1,46 +1,47 @@
-//! The layers of a file: which Gaussians come first, and in which order the ranges of all chunks lie.
+//! The layers of a file: which Gaussians come first, and the order of the ranges of all chunks in the data.
 
 use serde::{Deserialize, Serialize};
 
 use crate::packed::bitstream::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
-/// Scenes of fewer Gaussians have one layer by default. Their files are small.
+/// Least number of Gaussians of a scene with two layers, by default. Smaller scenes have small files.
 pub(in crate::packed) const LEAST_LAYERED: usize = 8000;
-/// Shares of the Gaussians in all layers but the last, where there are several.
+/// Share of the Gaussians in each layer but the last, for scenes with several layers.
 const SHARES: [f64; 1] = [0.14];
-/// A Gaussian is drawn into a layer with a probability that grows with this power of the change of pictures without it. With
-/// 1 those that show most would stand alone, with holes between them (docs/METHOD.md, "Layers").
+/// Power of the energy to which the probability of a layer is proportional. The energy of a Gaussian is the squared change
+/// of pictures without it. With a power of 1 the Gaussians that show most would stand alone, with holes between them
+/// (docs/METHOD.md, "Layers").
 const ENERGY_POWER: f64 = 0.6;
-/// Steps of the search for the factor of these probabilities.
+/// Most steps of the search for the factor of these probabilities.
 const FACTOR_STEPS: usize = 60;
-/// Least and most Gaussians of a chunk, and a layer's number of chunks of a size between. Small ones arrive soon, and large
-/// ones take fewer bytes.
+/// Least and most Gaussians of a chunk, and the number of chunks of a layer whose size is between these limits. Small
+/// chunks arrive soon, and large ones take fewer bytes in all.
 const LEAST_CHUNK: usize = 8192;
 pub(crate) const MOST_CHUNK: usize = 32_768;
 const CHUNKS: usize = 6;
-/// The last Gaussians of a layer join the chunk before them if they are at most its number over this.
+/// A remainder of a layer of up to `1 / REST` of a chunk joins the last chunk.
 const REST: usize = 2;
-/// Sizes of nonzeros at which their parts end, where there are layers.
+/// Smallest size of a nonzero in each part of SH-rest, in steps, for scenes with several layers.
 const PARTS: [u32; 3] = [12, 6, 1];
-/// Levels of refinement of each layer.
+/// Number of refinements of each layer, for scenes with several layers.
 const LEVELS: [u8; LAYERS] = [2, 1];
-/// Number of layers, where there are several.
+/// Number of layers of a scene with several layers.
 const LAYERS: usize = SHARES.len() + 1;
 
 /// The layers of a file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::packed) struct Layering {
-    /// Factors of the probabilities of all layers but the last; none if there is one layer.
+    /// Factor of the probabilities of each layer but the last. It is empty if there is one layer.
     factors: Vec<f64>,
-    /// Sums of the probabilities so far.
+    /// For each layer but the last, the sum of its probabilities over the Gaussians seen.
     sums: Vec<f64>,
-    /// Gaussians of a chunk of each layer.
+    /// Number of Gaussians of a chunk of each layer.
     chunks: Vec<usize>,
 }
 
 impl Layering {
-    /// The layers of a scene of `gaussians` Gaussians, or one if these are fewer than `layers_from`. `energies` are the
-    /// changes of pictures without each of some of the Gaussians, and for how many Gaussians each stands.
+    /// Creates the layers of a scene of `gaussians` Gaussians. There is one layer if `gaussians` is below `layers_from`.
+    /// `energies` holds the energies of a sample of the Gaussians, and the number of Gaussians that each stands for.
     pub(in crate::packed) fn new(
         gaussians: usize,
         layers_from: usize,
@@ -50,7 +51,7 @@ impl Layering {
         if gaussians >= layers_from.max(1) {
             let powers: Vec<(f64, f64)> =
                 energies.map(|(energy, count)| (power(energy), count as f64)).collect();
-            // The probability that a Gaussian is in no layer so far.
+            // The probability with which each Gaussian is in none of the layers so far.
             let mut left = vec![1.0; powers.len()];
             for share in SHARES {
                 let factor = factor(share, &powers, &left);
@@ -72,11 +73,11 @@ impl Layering {
         Self { sums: vec![0.5; count], factors, chunks }
     }
 
-    /// The layer of the next Gaussian in the order of cells.
+    /// Returns the layer of the next Gaussian, and counts it. Gaussians come in the order of cells.
     pub(in crate::packed) fn layer(&mut self, energy: f32) -> usize {
         let power = power(energy);
         for (layer, (factor, sum)) in self.factors.iter().zip(&mut self.sums).enumerate() {
-            // Sums that pass whole numbers draw Gaussians that lie far apart.
+            // A Gaussian is drawn when the sum passes a whole number. So Gaussians that are drawn lie far apart.
             let before = sum.floor();
             *sum += (factor * power).min(1.0);
             if sum.floor() > before {
@@ -91,24 +92,25 @@ impl Layering {
         self.factors.len() + 1
     }
 
-    /// How the layers are coded, with `parts` parts of nonzeros.
+    /// Returns the form of each layer, with `parts` parts of SH-rest.
     pub(in crate::packed) fn forms(&self, parts: usize) -> Vec<LayerForm> {
         let levels: &[u8] = if self.layers() > 1 { &LEVELS } else { &[0] };
         layer_forms(levels, parts, self.layers() > 1)
     }
 
-    /// Probability that a Gaussian is of layer `layer` if it is of no layer before.
+    /// Returns the probability with which a Gaussian that is in no earlier layer is drawn into `layer`.
     pub(in crate::packed) fn probability(&self, layer: usize, energy: f32) -> f64 {
         self.factors.get(layer).map_or(1.0, |factor| (factor * power(energy)).min(1.0))
     }
 
-    /// Gaussians of the next chunk of a layer of which so many are left.
+    /// Returns the number of Gaussians of the next chunk of `layer`. `left` is the number of Gaussians of the layer that
+    /// are in no chunk yet.
     pub(in crate::packed) fn next_chunk(&self, layer: usize, left: usize) -> usize {
         let size = self.chunks.get(layer).copied().unwrap_or(MOST_CHUNK);
         if left > size + size / REST { size } else { left }
     }
 
-    /// How rows of `dim` coefficients are coded with `atoms` atoms.
+    /// Returns how rows of `dim` coefficients are coded with `atoms` atoms.
     pub(in crate::packed) fn rest(&self, dim: usize, atoms: usize) -> RestForm {
         let least = match self.layers() {
             _ if dim == 0 => Vec::new(),
@@ -118,14 +120,14 @@ impl Layering {
         RestForm { dim, atoms, least }
     }
 
-    /// The order of the ranges of `chunks` in the data, of which the first layers come first. Chunks have `parts` parts of
-    /// nonzeros. `energies` are the changes of pictures without each chunk.
+    /// Returns the order of the ranges of `chunks` in the data. Each chunk has `parts` parts of SH-rest, and `energies`
+    /// holds the sum of its Gaussians' energies.
     pub(in crate::packed) fn order(&self, chunks: &[Chunk], energies: &[f64], parts: usize) -> Vec<Place> {
         let forms = self.forms(parts);
         let mut order = Order { parts, order: Vec::new(), finer: vec![0; chunks.len()] };
         let of = |layer: usize| (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
-        // The first layer at once, one kind of range after the other, and of other layers chunk after chunk those that show
-        // most for their bytes first.
+        // The first layer comes as a whole, one kind of range after the other. Other layers come chunk by chunk, in falling
+        // order of energy over bytes of the base.
         for kind in [Order::base, Order::interim, Order::largest] {
             of(0).for_each(|c| kind(&mut order, c, forms[0]));
         }
@@ -142,7 +144,7 @@ impl Layering {
                     kind(&mut order, c, *form);
                 }
                 there[c] = true;
-                // Where a layer is there, those before become finer by a level.
+                // As soon as the chunks around an earlier chunk are there, that chunk is refined by one level.
                 for before in (0..chunks.len()).filter(|&b| chunks[b].layer < layer) {
                     if !there[before] && overlapping(chunks, before, layer).all(|c| there[c]) {
                         order.finer(before, forms[chunks[before].layer]);
@@ -151,7 +153,7 @@ impl Layering {
                 }
             }
         }
-        // The rest in all layers: larger nonzeros, what is left of coarse steps, the smallest nonzeros.
+        // The remaining ranges of all layers follow: middle nonzeros, remaining refinements, smallest nonzeros.
         let last = parts.saturating_sub(1);
         for part in 1..last {
             (0..chunks.len()).for_each(|c| order.part(c, forms[chunks[c].layer], part));
@@ -167,11 +169,11 @@ impl Layering {
     }
 }
 
-/// An order of ranges that is being made.
+/// An order of ranges under construction.
 struct Order {
     parts: usize,
     order: Vec<Place>,
-    /// Levels of refinement of each chunk so far.
+    /// Number of refinements of each chunk that are in the order.
     finer: Vec<usize>,
 }
 
@@ -201,7 +203,7 @@ impl Order {
         self.put(chunk, 1 + form.levels + part);
     }
 
-    /// The next refinement of a chunk, if there is one.
+    /// Adds the next refinement of `chunk`. Returns whether there was one.
     fn finer(&mut self, chunk: usize, form: LayerForm) -> bool {
         let level = self.finer[chunk];
         if level < form.levels {
@@ -212,7 +214,7 @@ impl Order {
     }
 }
 
-/// The chunks of a layer whose cells overlap those of a chunk of another.
+/// Returns the chunks of `layer` whose cells overlap those of the chunk `own` of another layer.
 fn overlapping(chunks: &[Chunk], own: usize, layer: usize) -> impl Iterator<Item = usize> {
     let end = |c: usize| match chunks.get(c + 1) {
         Some(next) if next.layer == chunks[c].layer => next.cell,
@@ -223,13 +225,13 @@ fn overlapping(chunks: &[Chunk], own: usize, layer: usize) -> impl Iterator<Item
     of.filter(move |&c| chunks[c].cell <= cells.end && end(c) >= cells.start)
 }
 
-/// What probabilities are proportional to, unless they are 1.
+/// Returns the number to which the probability of a Gaussian is proportional, as long as it is below 1.
 fn power(energy: f32) -> f64 {
     libm::pow(f64::from(energy).max(0.0), ENERGY_POWER)
 }
 
-/// The factor with which probabilities sum to `share` of all Gaussians. `powers` are those of some, and how many Gaussians each
-/// stands for, of which these shares are left.
+/// Returns the factor with which the probabilities sum to `share` of all Gaussians. `powers` holds a power of an energy and
+/// the number of Gaussians that it stands for. `left` holds the share of these Gaussians that is in no earlier layer.
 fn factor(share: f64, powers: &[(f64, f64)], left: &[f64]) -> f64 {
     let all: f64 = powers.iter().map(|p| p.1).sum();
     let wanted = (share * all).max(f64::MIN_POSITIVE);
@@ -237,7 +239,7 @@ fn factor(share: f64, powers: &[(f64, f64)], left: &[f64]) -> f64 {
         let of = |((power, count), left): (&(f64, f64), &f64)| left * (factor * power).min(1.0) * count;
         powers.iter().zip(left).map(of).sum::<f64>()
     };
-    // As if all probabilities were below 1; more where some are not.
+    // The first guess assumes that all probabilities are below 1. Where some are not, the factor has to be larger.
     let whole: f64 = powers.iter().zip(left).map(|((power, count), left)| left * power * count).sum();
     let mut factor = wanted / whole.max(f64::MIN_POSITIVE);
     for _ in 0..FACTOR_STEPS {

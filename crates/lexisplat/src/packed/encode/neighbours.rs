@@ -1,24 +1,23 @@
-//! Averages of the Gaussians just before one, on which predictors are fitted.
+//! Averages of the last Gaussians, for the fit of predictors.
 
 use crate::packed::bitstream::parameters::TARGETS;
 use crate::support::maths::Vec3;
 
-/// Gaussians remembered. More of them gain little, since neighbours on the Morton curve are neighbours in
-/// space.
+/// Number of Gaussians that are remembered. More gain little, since neighbours on the Morton curve are neighbours in space.
 const WINDOW: usize = 16;
 
-/// The last few Gaussians.
+/// The last [`WINDOW`] Gaussians.
 #[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct Neighbours {
     positions: [Vec3; WINDOW],
     values: [[f32; TARGETS]; WINDOW],
-    /// Number seen so far.
+    /// Number of Gaussians pushed.
     seen: usize,
 }
 
 impl Neighbours {
-    /// Averages around `centre`, weighted by the inverse squared distance, which is taken to be at least
-    /// `near`. `None` before the first Gaussian.
+    /// Returns the averages of the remembered values, weighted by `1 / (distance^2 + near^2)` from `centre`. `None` if no
+    /// Gaussian was pushed.
     pub(in crate::packed) fn average(&self, centre: Vec3, near: f32) -> Option<[f32; TARGETS]> {
         let known = self.seen.min(WINDOW);
         if known == 0 {
@@ -35,7 +34,7 @@ impl Neighbours {
                 *sum += weight * value;
             }
         }
-        // At distances beyond f32 all weights are 0.
+        // All weights are 0 at distances that leave f32.
         let average = sums.map(|sum| sum / total);
         average.iter().all(|v| v.is_finite()).then_some(average)
     }

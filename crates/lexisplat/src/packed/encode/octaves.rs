@@ -1,15 +1,15 @@
-//! Weights as whole numbers of parts of an octave, and how often each occurs.
+//! Weights as whole numbers of parts of an octave, and histograms of them.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Parts of an octave. A weight that is rounded to one of them is off by at most 4.4 %.
+/// Parts of an octave. Rounding a weight to a part changes it by at most 4.4 %.
 const PER_OCTAVE: f64 = 8.0;
 /// The code of a weight of 0.
 const NONE: i16 = i16::MIN;
 
-/// The code of a weight that is not below 0: its binary logarithm in parts of an octave.
+/// Returns the code of a weight that is at least 0: its binary logarithm in parts of an octave.
 pub(in crate::packed) fn octaves(weight: f32) -> i16 {
     if weight <= 0.0 || !weight.is_finite() {
         return NONE;
@@ -19,7 +19,7 @@ pub(in crate::packed) fn octaves(weight: f32) -> i16 {
     octaves
 }
 
-/// The weight of a number.
+/// Returns the weight of a code.
 pub(in crate::packed) fn weight(octaves: i16) -> f32 {
     if octaves == NONE {
         return 0.0;
@@ -32,15 +32,15 @@ pub(in crate::packed) fn weight(octaves: i16) -> f32 {
 /// Pairs of weights of many Gaussians, in two bytes each.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(in crate::packed) struct Pairs {
-    /// The largest numbers.
+    /// The largest code of each weight of a pair.
     most: [i16; 2],
-    /// How far each number is below the largest: at most [`FARTHEST`], or [`ZERO`].
+    /// Distance of each code from the largest: at most [`FARTHEST`], or [`ZERO`].
     below: Vec<[u8; 2]>,
 }
 
-/// Numbers farther below the largest than this, nearly 32 octaves, count as this.
+/// Largest distance of a code from the largest, nearly 32 octaves. Weights farther below count as this.
 const FARTHEST: u8 = 254;
-/// What stands for weights of 0.
+/// The distance that marks a weight of 0.
 const ZERO: u8 = 255;
 
 impl Pairs {
@@ -56,12 +56,12 @@ impl Pairs {
         Self { most, below: weights.iter().map(|pair| [below(0, pair[0]), below(1, pair[1])]).collect() }
     }
 
-    /// Number of pairs.
+    /// Returns the number of pairs.
     pub(in crate::packed) fn len(&self) -> usize {
         self.below.len()
     }
 
-    /// The pairs, as far as they are kept.
+    /// Returns the pairs, as rounded.
     pub(in crate::packed) fn iter(&self) -> impl Iterator<Item = [f32; 2]> {
         let tables: [Vec<f32>; 2] = [0, 1].map(|k| {
             let number = |below: u8| self.most[k].saturating_sub(below.into());
@@ -71,7 +71,7 @@ impl Pairs {
     }
 }
 
-/// How often weights occur.
+/// A histogram of the codes of weights.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(in crate::packed) struct Histogram(BTreeMap<i16, u64>);
 
@@ -80,22 +80,22 @@ impl Histogram {
         *self.0.entry(octaves(weight)).or_default() += 1;
     }
 
-    /// Adds other weights.
+    /// Adds the weights of `other`.
     pub(in crate::packed) fn merge(&mut self, other: &Self) {
         other.0.iter().for_each(|(octaves, count)| *self.0.entry(*octaves).or_default() += count);
     }
 
-    /// The weights, rising, and how often each occurs.
+    /// Returns the weights in rising order, and how often each occurs.
     pub(in crate::packed) fn iter(&self) -> impl Iterator<Item = (f32, u64)> {
         self.0.iter().map(|(&octaves, &count)| (weight(octaves), count))
     }
 
-    /// Number of weights.
+    /// Returns the number of weights.
     pub(in crate::packed) fn count(&self) -> u64 {
         self.0.values().sum()
     }
 
-    /// The weight that `share` of all weights are not above; 0 if there are none.
+    /// Returns the weight below or at which `share` of all weights are; 0 if there are no weights.
     pub(in crate::packed) fn quantile(&self, share: f64) -> f32 {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
         let mut left = (self.count().saturating_sub(1) as f64 * share) as u64;
@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(pairs.len(), 200);
         for (given, found) in weights.iter().zip(pairs.iter()) {
             for k in 0..2 {
-                // Weights farther below the largest stay what they are there.
+                // Weights farther below the largest are raised to this.
                 let least = [200e-9, 1e3][k] * 2.0_f32.powf(-f32::from(FARTHEST) / 8.0);
                 let ratio = if given[k] == 0.0 { 1.0 } else { found[k] / given[k].max(least) };
                 assert!((0.955..1.047).contains(&ratio), "{given:?} {found:?}");

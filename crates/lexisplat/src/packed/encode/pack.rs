@@ -1,4 +1,4 @@
-//! From a scene to a packed file.
+//! Packing of a scene: options, and the steps from a scene to a packed file.
 
 use std::borrow::Borrow;
 
@@ -22,37 +22,36 @@ use crate::support::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
 use crate::support::maths::at_share;
 use crate::support::progress::Progress;
 
-/// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians. This and the
-/// next three constants are fitted to held-out views of the models in docs/METHOD.md, which they miss by up to
-/// 3 dB.
+/// Expected PSNR in dB at an overall step of `EXPECTED_STEP / sqrt(gaussians)`. This constant and the next three are fitted
+/// to held-out views of the models in docs/METHOD.md, which they miss by up to 3 dB.
 const EXPECTED_DB: f64 = 40.0;
 const EXPECTED_STEP: f64 = 2.3e-3;
-/// Growth of the PSNR when the step halves, and the growth of that growth.
+/// Growth of the PSNR in dB when the step halves, and the growth of that growth.
 const DB_PER_OCTAVE: f64 = 4.5;
 const DB_PER_OCTAVE_2: f64 = 0.15;
 /// Largest PSNR that is expected, in dB.
 const MOST_DB: f64 = 100.0;
 
-/// How to pack.
+/// Options of packing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct PackOptions {
-    /// Un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are then as exact as
+    /// Un-squared L2 norm that the SH-rest error of no Gaussian exceeds. By default there is none, and SH are as exact as
     /// pictures need.
     pub tolerance: Option<f64>,
-    /// Atoms to learn, 1 to 1024; `None` for as many as the scene pays for.
+    /// Number of atoms to learn, 1 to 1024. `None` lets the size of the scene decide.
     pub atoms: Option<usize>,
-    /// Store each Gaussian's place in the source. Then none is left out.
+    /// Stores the place of each Gaussian in the source. Then no Gaussian is left out.
     pub keep_order: bool,
-    /// Leave no Gaussian out, and keep base colours and opacities. A tolerance does so too.
+    /// Leaves no Gaussian out, and keeps base colours and opacities. A tolerance does so too.
     pub keep_all: bool,
     /// Seed of the learning sample.
     pub seed: u64,
-    /// Up to 15 points that the scene is seen from. Base colours are then those that are seen from there on average, so
-    /// that they are right without SH-rest too.
+    /// Up to 15 points from which the scene is seen. The file then holds the base colours that are seen from these points
+    /// on average, so that colours are right without SH-rest too.
     pub viewpoints: Vec<[f32; 3]>,
-    /// Scenes of at least so many Gaussians have two layers, of which the first draws the whole scene, and others have one.
-    /// Default 8,000; `usize::MAX` for one layer always.
+    /// Least number of Gaussians of a scene with two layers. The first layer draws the whole scene coarsely. Smaller scenes
+    /// have one layer. Default 8,000; `usize::MAX` for one layer always.
     pub layers_from: usize,
 }
 
@@ -81,7 +80,7 @@ impl PackOptions {
         with_layers_from(layers_from: usize),
     );
 
-    /// Whether Gaussians may be left out, and base colours and opacities changed to make up for errors.
+    /// Returns whether packing may leave Gaussians out, and may change base colours and opacities to make up for errors.
     #[must_use]
     pub fn may_change(&self) -> bool {
         !self.keep_all && !self.keep_order && self.tolerance.is_none()
@@ -115,13 +114,13 @@ pub struct Packer<S> {
     scene: Vec<MortonKey>,
     fit: Fit,
     mean_view: MeanView,
-    /// Base colours that files hold.
+    /// The base colours that the file holds, by index in `splats`.
     dc: Vec<[f32; 3]>,
     weights: Weights,
 }
 
 impl<S: Borrow<Splats>> Packer<S> {
-    /// Prepares `splats`. `sensitivity` says how much pictures depend on each of its values.
+    /// Prepares `splats`. `sensitivity` says how much pictures depend on each value of each Gaussian.
     ///
     /// # Errors
     /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values or weights that
@@ -140,40 +139,42 @@ impl<S: Borrow<Splats>> Packer<S> {
         Ok(Self { splats, options: options.clone(), scene, fit, mean_view, dc, weights })
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         self.scene.len()
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.scene.is_empty()
     }
 
-    /// The overall step for pictures of about this PSNR, in dB. Errors of all Gaussians add up, so the step
-    /// falls with the root of their number.
+    /// Returns the overall step at which pictures are expected to have a PSNR of `decibels`, in dB. Errors of all Gaussians
+    /// add up, so the step falls with the root of their number.
     #[must_use]
     pub fn step_for(&self, decibels: f64) -> f64 {
         expected_step(self.len(), decibels)
     }
 
-    /// Packs with an overall step: about the root of the mean squared error of pictures that each value of
-    /// each Gaussian may make on its own. Half the step gives about 5 dB more. However large the step is, visible
+    /// Packs the scene with the overall step `step`. It is about the root of the mean squared error of pictures that each
+    /// value of each Gaussian may cause on its own. Half the step gives about 5 dB more. However large the step is, visible
     /// Gaussians keep a share of their own size, turn, opacity and colour (docs/METHOD.md, "The floor").
     ///
     /// # Errors
-    /// As [`Self::quantise`] and [`Quantised::finish`].
+    /// Those of [`Self::quantise`] and [`Quantised::finish`].
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
         self.quantise(step, true, progress)?.finish(None, None, progress)
     }
 
-    /// Settles everything that does not depend on base colours and opacities, with an overall step as in [`Self::pack`]. Without a
-    /// `floor` under what is visible the file can be smaller than the floor allows.
+    /// Settles everything that does not depend on base colours and opacities, with an overall step as in [`Self::pack`].
+    /// With `floor`, the steps of visible Gaussians are limited. Without it, steps have no limit, and the file can become
+    /// smaller.
     ///
-    /// Gaussians that show less than their bits are worth are left out, unless the options or the sensitivity keep
-    /// them: those whose largest change of a picture is not known, or that no picture showed.
+    /// A Gaussian is left out if pictures change less without it than its bits are worth. It stays if the options keep all
+    /// Gaussians, if its largest change of a picture is not known, or if no picture showed it and its opacity is at least
+    /// 1/255.
     ///
     /// # Errors
     /// [`Error::Parameter`] if `step` is not finite and above 0, or values are so large that sums of them
@@ -200,10 +201,10 @@ impl<S: Borrow<Splats>> Packer<S> {
     }
 }
 
-/// Share of the Gaussians whose base colours the unit of base colours is for. A few wild ones must not make all others coarse.
+/// Share of the Gaussians whose base colours set the unit of base colours. The rest are too few to make all others coarse.
 pub(in crate::packed) const USUAL_DC: f64 = 0.999;
 
-/// The largest coordinate of usual base colours.
+/// Returns the quantile [`USUAL_DC`] of the largest coordinates of the base colours.
 pub(in crate::packed) fn most_dc(parameters: &Parameters, dc: &[[f32; 3]]) -> f64 {
     let largest =
         |&dc: &[f32; 3]| parameters.dc_coordinates(dc).into_iter().fold(0.0_f32, |most, x| most.max(x.abs()));
@@ -212,16 +213,17 @@ pub(in crate::packed) fn most_dc(parameters: &Parameters, dc: &[[f32; 3]]) -> f6
     f64::from(at_share(&all, USUAL_DC))
 }
 
-/// [`Packer::step_for`] of a scene of `gaussians` Gaussians.
+/// Returns [`Packer::step_for`] of a scene of `gaussians` Gaussians.
 pub(crate) fn expected_step(gaussians: usize, decibels: f64) -> f64 {
-    // decibels = EXPECTED_DB + DB_PER_OCTAVE x + DB_PER_OCTAVE_2 x^2, with x the octaves below.
+    // `decibels = EXPECTED_DB + DB_PER_OCTAVE * x + DB_PER_OCTAVE_2 * x^2`, where `x` is the number of octaves below the
+    // expected step.
     let over = decibels.clamp(0.0, MOST_DB) - EXPECTED_DB;
     let root = (DB_PER_OCTAVE * DB_PER_OCTAVE + 4.0 * DB_PER_OCTAVE_2 * over).max(0.0).sqrt();
     let octaves = (root - DB_PER_OCTAVE) / (2.0 * DB_PER_OCTAVE_2);
     EXPECTED_STEP * libm::exp2(-octaves) / (gaussians.max(1) as f64).sqrt()
 }
 
-/// Refuses scenes and sensitivities that do not fit one another or are not finite.
+/// Refuses a scene and a sensitivity that have different lengths, or values that are not finite.
 pub(crate) fn check(splats: &Splats, sensitivity: &Sensitivity) -> Result<()> {
     splats.validate()?;
     Limits::check("Gaussians", splats.len() as u64, MAX_GAUSSIANS)?;

@@ -1,4 +1,4 @@
-//! A scene at one overall step, ready to be written with any base colours and opacities.
+//! A scene that is quantised with one overall step. Its base colours and opacities can still change.
 
 use std::ops::Range;
 
@@ -26,27 +26,28 @@ use crate::support::progress::{Progress, Stage};
 use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
 
-/// Fits base colours and opacities of a part of a scene to pictures of it.
+/// A function that fits the base colours and opacities of a part of a scene to pictures of the part.
 ///
-/// The arguments are the part, the model that a file has of it, and for each Gaussian of the model how pictures depend on its
-/// colour and on the logarithm of its opacity. The result has one appearance for each Gaussian of the model, or is `None` if
-/// nothing is fitted.
+/// Its arguments are the part, the model that the file has of it, and for each Gaussian of the model the sensitivities to
+/// its colour and to the logarithm of its opacity. It returns one appearance for each Gaussian of the model, or `None` to
+/// leave them as they are.
 pub type Refit<'a, E = Error> =
     dyn FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>, E> + 'a;
 
-/// Gaussians that a file has, all in the same order.
+/// The Gaussians of a file. All lists have the same order.
 #[derive(Debug, Default)]
 pub(in crate::packed) struct Gaussians {
-    /// Cells and places in the source.
+    /// The cell of each Gaussian, and its index in the source.
     pub(in crate::packed) scene: Vec<MortonKey>,
-    /// Colour and shape class of each.
+    /// The colour class and the shape class of each Gaussian.
     pub(in crate::packed) classes: Vec<[u8; 2]>,
-    /// Sensitivities of each to its colour and to the logarithm of its opacity.
+    /// The sensitivities of each Gaussian to its colour and to the logarithm of its opacity.
     pub(in crate::packed) weights: Vec<[f32; 2]>,
 }
 
 impl Gaussians {
-    /// Puts Gaussians in the order of cells in the order of layers. Returns the number of Gaussians of each layer.
+    /// Sorts the Gaussians by layer. Within a layer they stay in the order of cells. Returns the number of Gaussians of
+    /// each layer.
     pub(in crate::packed) fn in_layers(&mut self, layering: &mut Layering) -> Vec<usize> {
         let layers: Vec<usize> = self.weights.iter().map(|w| layering.layer(w[1])).collect();
         let layers = &layers;
@@ -60,26 +61,27 @@ impl Gaussians {
     }
 }
 
-/// What is known of a scene's base colours before it is coded.
+/// Facts about the base colours of a scene that are known before it is coded.
 #[derive(Debug)]
 pub(in crate::packed) struct Fitted {
-    /// The largest coordinate.
+    /// The largest coordinate of usual base colours.
     pub(in crate::packed) most_dc: f64,
     pub(in crate::packed) mean_view: MeanView,
 }
 
-/// A scene at one overall step: which Gaussians stay, steps, dictionary and codes are settled. [`Self::finish`] makes the
-/// file with the scene's own base colours and opacities or with others, which change nothing else.
+/// A scene that is quantised with one overall step. The Gaussians that stay, the steps, the dictionary and the codes are
+/// settled. [`Self::finish`] makes the file with the scene's own base colours and opacities, or with others. These change
+/// nothing else.
 #[derive(Debug)]
 pub struct Quantised<'a> {
     splats: &'a Splats,
     options: &'a PackOptions,
     gaussians: Gaussians,
-    /// The layer and the Gaussians of each chunk.
+    /// The layer of each chunk, and its Gaussians.
     chunks: Vec<(usize, Range<usize>)>,
-    /// Of each chunk.
+    /// The codes of each chunk.
     codes: Vec<Codes>,
-    /// What the first layer looks like alone.
+    /// The interim changes of all layers but the last.
     alone: Alone,
     encoding: Encoding,
 }
@@ -107,7 +109,7 @@ impl<'a> Quantised<'a> {
         Ok(whole)
     }
 
-    /// A part of a scene, with what all parts are coded with.
+    /// Quantises a part of a scene. `encoding` has everything with which all parts are coded.
     pub(in crate::packed) fn of_part(
         splats: &'a Splats,
         options: &'a PackOptions,
@@ -141,27 +143,28 @@ impl<'a> Quantised<'a> {
         Ok(part)
     }
 
-    /// Number of Gaussians of the file.
+    /// Returns the number of Gaussians of the file.
     #[must_use]
     pub fn len(&self) -> usize {
         self.gaussians.scene.len()
     }
 
-    /// Whether the file has no Gaussians.
+    /// Returns whether the file has no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.gaussians.scene.is_empty()
     }
 
-    /// Sensitivities of each Gaussian to its colour and to the logarithm of its opacity, in the order of the file.
+    /// Returns the sensitivities of each Gaussian to its colour and to the logarithm of its opacity, in the order of the
+    /// file.
     #[must_use]
     pub fn weights(&self) -> &[[f32; 2]] {
         &self.gaussians.weights
     }
 
-    /// Makes the file, with the scene's own base colours and opacities or with these, one entry for each Gaussian in the
-    /// order of the file. `changes` are what Gaussians of the first layer change by while the second is not there, from what
-    /// [`Packed::first_layer`] shows.
+    /// Makes the file. `appearances` replaces the scene's own base colours and opacities, with one entry for each Gaussian
+    /// in the order of the file. `changes` are the interim changes of the Gaussians of the first layer, for the time while
+    /// the second layer is missing. They are relative to what [`Packed::first_layer`] shows.
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are more or fewer entries than Gaussians, if values are not finite, if an opacity is
@@ -176,8 +179,8 @@ impl<'a> Quantised<'a> {
         let view = OrderedGaussians { changes, ..self.view(appearances)? };
         changes.unwrap_or_default().iter().try_for_each(AppearanceChange::check)?;
         let mut encoding = self.encoding.clone();
-        // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
-        // symbols in memory would take more than the scene's geometry.
+        // The counting pass runs first, because the tables must be known before any symbol is coded. Keeping all symbols in
+        // memory would take more than the scene's geometry.
         let counted = self.each_chunk(view, progress, |_, tally, coded| {
             Counts::of(tally, coded.ranges.iter().map(|(range, _)| range))
         });
@@ -197,7 +200,8 @@ impl<'a> Quantised<'a> {
         Ok((Packed::new(head, self.extras(0..n), order, data.into_bytes()?), report))
     }
 
-    /// The layer and the symbols of each chunk with these appearances, or with the scene's own, and how often each symbol occurs.
+    /// Returns the counts of all symbols, and the layer and the symbols of each chunk. `appearances` replaces the scene's
+    /// own base colours and opacities.
     pub(in crate::packed) fn counted(
         &self,
         appearances: Option<&[Appearance]>,
@@ -217,7 +221,7 @@ impl<'a> Quantised<'a> {
         Ok((counts, chunks))
     }
 
-    /// The Gaussians as they are or with these appearances, which are refused as [`Self::finish`] says.
+    /// Returns the Gaussians with these appearances, or with their own. Refuses appearances as [`Self::finish`] says.
     pub(in crate::packed) fn view<'v>(
         &'v self,
         appearances: Option<&'v [Appearance]>,
@@ -233,7 +237,8 @@ impl<'a> Quantised<'a> {
         Ok(OrderedGaussians { appearances, ..OrderedGaussians::new(self.splats, scene, classes) })
     }
 
-    /// What `with` makes of the layer, the counts and the symbols of each chunk of `view`.
+    /// Calls `with` for each chunk of `view`, with its layer, the counts of its codes and its symbols. Returns the results
+    /// in the order of chunks.
     fn each_chunk<T: Send>(
         &self,
         view: OrderedGaussians<'_>,
@@ -249,7 +254,8 @@ impl<'a> Quantised<'a> {
         })
     }
 
-    /// What `with` makes of the layer, the counts and the targets of each chunk of `view`.
+    /// Calls `with` for each chunk of `view`, with its layer, the counts of its codes and its targets. Returns the results
+    /// in the order of chunks.
     pub(in crate::packed) fn each_target<T: Send>(
         &self,
         view: OrderedGaussians<'_>,
@@ -273,19 +279,19 @@ impl<'a> Quantised<'a> {
         })
     }
 
-    /// Number of Gaussians of each layer.
+    /// Returns the number of Gaussians of each layer.
     pub(in crate::packed) fn layer_counts(&self) -> Vec<usize> {
         let mut counts = vec![0; self.encoding.layering.layers()];
         self.chunks.iter().for_each(|(layer, range)| counts[*layer] += range.len());
         counts
     }
 
-    /// Cells and places in the source, in the order of the file.
+    /// Returns the cell of each Gaussian and its index in the source, in the order of the file.
     pub(in crate::packed) fn sources(&self) -> &[MortonKey] {
         &self.gaussians.scene
     }
 
-    /// The columns that are not drawn, of the Gaussians `range` in the order of the file.
+    /// Returns the properties that 3DGS does not define, for the Gaussians `range` in the order of the file.
     pub(in crate::packed) fn extras(&self, range: Range<usize>) -> Vec<Extra> {
         let sources = &self.gaussians.scene[range];
         let mut extras = self.splats.geometry.extras.clone();
@@ -295,7 +301,8 @@ impl<'a> Quantised<'a> {
         extras
     }
 
-    /// What `refit` fits to pictures, if base colours and opacities may change and there is something to fit.
+    /// Returns the appearances that `refit` fits to pictures. `None` if base colours and opacities may not change, or if
+    /// there are no Gaussians.
     pub(crate) fn refitted<E: From<Error>>(
         &self,
         refit: Option<&mut Refit<'_, E>>,

@@ -5,20 +5,20 @@ use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::Geometry;
 use crate::support::maths::log_sigmoid;
 
-/// A Gaussian is left out if the mean squared error of the pictures grows by less than this many squares of the
-/// overall step without it. With a step, a value of a Gaussian is coded to about one such square, so a Gaussian that
-/// changes pictures by less than its values together may do is not worth its bits. Found by trial (docs/METHOD.md).
+/// Least worth of a Gaussian: it is left out if the mean squared error of pictures grows by less than `REMOVAL * step^2`
+/// without it. `step` is the overall step, and a value of a Gaussian is coded to an error of about `step^2`. A Gaussian
+/// that changes pictures by less than the errors of its values is not worth its bits. Found by trial (docs/METHOD.md).
 const REMOVAL: f64 = 10.0;
 /// Removal of a Gaussian changes pictures by `max(mean, WORST_SHARE / excess * worst)`. `mean` is the mean squared change of all
 /// pictures, `worst` that of the picture that changes most, and `excess` the median of `worst / mean` over Gaussians. Found by
 /// trial (docs/METHOD.md).
 const WORST_SHARE: f32 = 0.8;
-/// Natural logarithm of the opacity below which a Gaussian is drawn in no pixel: 1/255, a rule of 3DGS.
+/// Natural logarithm of 1/255. A Gaussian of smaller opacity is drawn in no pixel, by a rule of 3DGS.
 const NEVER_DRAWN: f32 = -5.541_264;
 
-/// Squared change of the pictures if each Gaussian is left out; infinite if it must stay. On average that change is the
-/// sensitivity to the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian. No single picture
-/// may change much more.
+/// Returns the squared change of pictures if each Gaussian is left out; infinite if it must stay. The mean change is the
+/// sensitivity to the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian. The picture that
+/// changes most counts too; see [`WORST_SHARE`].
 pub(in crate::packed) fn changes_without(
     geometry: &Geometry,
     sensitivity: &Sensitivity,
@@ -26,7 +26,7 @@ pub(in crate::packed) fn changes_without(
 ) -> Vec<f32> {
     let share = WORST_SHARE / usual_excess(sensitivity);
     let change = |i: usize| {
-        // What no view showed may show in others. Where nothing was measured it is infinite.
+        // A Gaussian that no measured view showed may show in others. `removal` is infinite where nothing was measured.
         let largest = sensitivity.removal[i];
         match may_change && largest.is_finite() {
             true if largest > 0.0 => sensitivity.opacity[i].max(share * sensitivity.removal_view[i]),
@@ -37,8 +37,9 @@ pub(in crate::packed) fn changes_without(
     (0..sensitivity.len()).map(change).collect()
 }
 
-/// How much more the most changed picture changes than pictures do on average, for the median Gaussian of those that
-/// pictures showed; infinite if there are none. The larger a scene, the fewer pictures show a Gaussian.
+/// Returns the median of `worst / mean` over the Gaussians that pictures showed; infinite if there are none. `worst` is the
+/// change of the picture that changes most without a Gaussian, `mean` that of pictures on average. The fewer of the
+/// pictures show a Gaussian, the larger the ratio is, so it grows with the scene.
 fn usual_excess(sensitivity: &Sensitivity) -> f32 {
     let pairs = sensitivity.opacity.iter().zip(&sensitivity.removal_view);
     let mut excess: Vec<f32> =
@@ -50,22 +51,22 @@ fn usual_excess(sensitivity: &Sensitivity) -> f32 {
     *excess.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
-/// Whether a Gaussian without which pictures change by `change` stays at an overall step.
+/// Returns whether a Gaussian stays at the overall step `step`. `change` is the squared change of pictures without it.
 pub(in crate::packed) fn is_worth_its_bits(change: f32, step: f64) -> bool {
     f64::from(change) >= REMOVAL * step * step
 }
 
-/// How much pictures depend on each Gaussian as a whole.
+/// The dependence of pictures on each Gaussian as a whole.
 #[derive(Debug)]
 pub(in crate::packed) struct Weights {
-    /// Sensitivities to the colour and to the logarithm of the opacity.
+    /// The sensitivities of each Gaussian to its colour and to the logarithm of its opacity.
     pub(in crate::packed) shown: Vec<[f32; 2]>,
-    /// As [`changes_without`].
+    /// The result of [`changes_without`] for each Gaussian.
     left_out: Vec<f32>,
 }
 
 impl Weights {
-    /// The weights of the Gaussians of `geometry` in the order of `scene`, of which some may be left out if they
+    /// Computes the weights of the Gaussians of `geometry`, in the order of `scene`. None may be left out unless
     /// `may_change`.
     pub(in crate::packed) fn new(
         geometry: &Geometry,
@@ -80,7 +81,7 @@ impl Weights {
         }
     }
 
-    /// The places of the Gaussians that stay at an overall step. At least one stays, if there are any.
+    /// Returns the places of the Gaussians that stay at the overall step `step`. At least one stays, if there are any.
     pub(in crate::packed) fn kept(&self, step: f64) -> Vec<usize> {
         let kept: Vec<usize> =
             (0..self.left_out.len()).filter(|&i| is_worth_its_bits(self.left_out[i], step)).collect();
@@ -99,7 +100,8 @@ mod tests {
     use crate::support::testing::scene;
     use crate::{Silent, Splats};
 
-    /// A scene whose Gaussians have their number, and measured weights: every fifth shows in nothing.
+    /// A scene whose Gaussians have their number as an extra property, and a measured sensitivity. Every fifth Gaussian
+    /// shows in no picture.
     fn measured() -> (Splats, Sensitivity) {
         let mut splats = scene(600, 2);
         let numbers = ExtraValues::U32((0..600).collect());
@@ -112,7 +114,7 @@ mod tests {
         (splats, sensitivity)
     }
 
-    /// The numbers of the Gaussians of a file.
+    /// Packs `splats` and returns the numbers of the Gaussians of the file, in rising order.
     fn numbers(splats: &Splats, sensitivity: &Sensitivity, options: &PackOptions) -> Vec<u32> {
         let packer = Packer::new(splats, sensitivity, options).unwrap();
         let (packed, _) = packer.pack(1e-7, &Silent).unwrap();
@@ -130,7 +132,7 @@ mod tests {
         let options = PackOptions::default();
         let rest = |step: u32| (0..600).filter(|k| k % step != 0).collect::<Vec<u32>>();
         assert_eq!(numbers(&splats, &sensitivity, &options), rest(5));
-        // What a single picture shows much more than others do stays.
+        // A Gaussian that one picture shows much more than others do stays.
         for (most, mean) in sensitivity.removal_view.iter_mut().zip(&sensitivity.opacity) {
             *most = 3.0 * mean;
         }
@@ -141,7 +143,7 @@ mod tests {
                 .eq((0..600).filter(|k| k % 5 != 0 || *k == 5))
         );
         sensitivity.removal_view.fill(0.0);
-        // What no view showed stays, unless no view can show it.
+        // A Gaussian that no view showed stays, unless its opacity is so small that no view can show it.
         for i in (0..600).step_by(10) {
             sensitivity.removal[i] = 0.0;
         }

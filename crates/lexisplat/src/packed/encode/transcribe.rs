@@ -1,4 +1,4 @@
-//! Ranges of a chunk that are coded anew, with other tables.
+//! Recoding of the ranges of a chunk with other tables.
 
 use crate::packed::bitstream::chunk::{Form, LayerForm, lanes, sets};
 use crate::packed::bitstream::fill_in::{CHANGES, interim};
@@ -11,7 +11,7 @@ use crate::packed::entropy::rans_encoder::SymbolRecorder;
 use crate::packed::entropy::symbols::{LANES, Lanes, Symbols};
 use crate::packed::entropy::tables::Lookup;
 
-/// A decoder that records what it decodes.
+/// A decoder that records the symbols that it decodes.
 struct Transcriber<'l> {
     from: SymbolDecoder<'l>,
     to: SymbolRecorder,
@@ -42,8 +42,8 @@ impl Symbols for Transcriber<'_> {
 }
 
 impl Form {
-    /// The symbols of all ranges of a chunk of `gaussians` Gaussians, which are coded with the tables of `lookup`. `None` if no
-    /// encoder writes this.
+    /// Decodes all ranges of a chunk of `gaussians` Gaussians, which are coded with the tables of `lookup`, and returns
+    /// their symbols. `None` if the ranges are not the output of an encoder.
     pub(in crate::packed) fn transcribe(
         &self,
         layer: LayerForm,
@@ -78,7 +78,7 @@ impl Form {
                 }
                 rest.clear();
             }
-            // Symbols of damaged ranges may take no bytes, so that recording them would not end.
+            // Symbols of damaged ranges may take no bytes. Without this check, recording them would not end.
             let good = |range: &Transcriber<'_>| range.from.good();
             if !(good(base) && finer.iter().chain(&*parts).chain(&*changed).all(good)) {
                 return None;

@@ -1,25 +1,26 @@
-//! Bits with probabilities that adapt: a range coder for what is written once a file.
+//! Bits with adaptive probabilities: a range coder for the parts of a file that are written once.
 //!
-//! The decoder takes 32 bits of state. All its products are below 2^32.
+//! The decoder's state is a code and a range, of 32 bits each. All of its products are below 2^32.
 
-/// Bits of a probability.
+/// Number of bits of a probability.
 const PRECISION: u32 = 12;
-/// Least probability of either bit.
+/// Smallest probability of either bit, in units of 2^-12.
 const LEAST: u16 = 48;
-/// By how many bits the distance from certainty is shifted after each of the first bits, and after all others.
+/// Shifts of the distance from certainty: after each of the first bits, and after all later bits.
 const RATES: [u32; 6] = [1, 2, 3, 4, 4, 5];
-/// The range is kept above this.
+/// The range is kept at or above this.
 const LEAST_RANGE: u32 = 1 << 24;
 
-/// Half of the unit of probabilities.
+/// The probability one half.
 const HALF: u16 = 1 << (PRECISION - 1);
 
-/// The probability that a bit is 0, and how many bits it has seen.
+/// The adaptive probability that a bit is 0, and the number of bits it has learned from.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::packed) struct BitModel {
-    /// By how much the probability is above a half.
+    /// Difference of the probability from one half.
     above: i16,
-    /// It counts to 255. As wide as the other one it leaves no gap, so that many odds are cleared at once.
+    /// Number of bits seen, at most 255. It is as wide as the other field, so there is no padding, and many models are
+    /// cleared at once.
     seen: u16,
 }
 
@@ -37,9 +38,9 @@ impl BitModel {
     }
 }
 
-/// The encoder or the decoder of bits. The encoder writes what it is given. The decoder ignores it. Both return the bit.
+/// An encoder or a decoder of bits. An encoder writes the bit that it is given. A decoder ignores it. Both return the bit.
 pub(in crate::packed) trait Bits {
-    /// A bit below a threshold of the range.
+    /// Codes a bit that is 0 with the probability `zero`.
     fn split(&mut self, zero: u16, bit: bool) -> bool;
 
     fn bit(&mut self, odds: &mut BitModel, bit: bool) -> bool {
@@ -48,13 +49,13 @@ pub(in crate::packed) trait Bits {
         bit
     }
 
-    /// `count` bits, highest first, of which 0 and 1 are as likely.
+    /// Codes `count` bits of `value`, highest first. Both values of a bit have the same probability.
     fn even(&mut self, count: u32, value: u32) -> u32 {
         (0..count).rev().fold(0, |all, k| all << 1 | u32::from(self.split(HALF, value >> k & 1 == 1)))
     }
 
-    /// A number from 1 to less than 2^`odds.len()`: its length in bits one by one, and the bits after the leading one, of
-    /// which the first has odds too.
+    /// Codes a number from 1 to less than `2^odds.len()`. Its length in bits is coded in unary with adaptive probabilities.
+    /// The bits after the leading one follow with even probabilities.
     fn positive(&mut self, odds: &mut [BitModel], value: u32) -> u32 {
         let wanted = u32::BITS - value.max(1).leading_zeros();
         let mut length = 1;
@@ -67,7 +68,7 @@ pub(in crate::packed) trait Bits {
         1 << (length - 1) | self.even(length - 1, value & !(1 << (length - 1)))
     }
 
-    /// A number with a sign.
+    /// Codes a number with a sign.
     fn signed(&mut self, odds: &mut SignedBitModel, value: i32) -> i32 {
         if !self.bit(&mut odds.nonzero, value != 0) {
             return 0;
@@ -78,10 +79,10 @@ pub(in crate::packed) trait Bits {
     }
 }
 
-/// Most bits of the size of a number with a sign, and one.
+/// Largest number of bits of the magnitude of a number with a sign, plus 1.
 const SIZE_BITS: usize = 16;
 
-/// The odds of numbers with a sign.
+/// The adaptive probabilities of numbers with a sign.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::packed) struct SignedBitModel {
     nonzero: BitModel,
@@ -89,13 +90,13 @@ pub(in crate::packed) struct SignedBitModel {
     size: [BitModel; SIZE_BITS],
 }
 
-/// Writes bits.
+/// An encoder that writes bits.
 #[derive(Debug)]
 pub(in crate::packed) struct BitEncoder {
     bytes: Vec<u8>,
     low: u64,
     range: u32,
-    /// Bytes that a carry may still change: one, and a number of 255s.
+    /// Bytes that a carry may still change: one byte, followed by a number of bytes of 255.
     held: u8,
     waiting: usize,
     started: bool,
@@ -108,7 +109,7 @@ impl Default for BitEncoder {
 }
 
 impl BitEncoder {
-    /// Moves the highest byte of `low` out.
+    /// Moves byte 3 of `low` to the held bytes, and adds the carry above it to them.
     fn shift(&mut self) {
         let [_, _, _, byte, carry, ..] = self.low.to_le_bytes();
         if carry == 1 || self.low < 0xff00_0000 {
@@ -123,9 +124,9 @@ impl BitEncoder {
         self.low = (self.low & 0x00ff_ffff) << 8;
     }
 
-    /// The bytes, without zeros at the end.
+    /// Returns the bytes, without zeros at the end.
     pub(in crate::packed) fn finish(mut self) -> Vec<u8> {
-        // The number within the range that ends with the most zeros.
+        // The number within the final range that has the most zero bits at its end.
         let end = self.low + u64::from(self.range);
         let zeros =
             (0..32).rev().find(|&zeros| ((self.low + (1 << zeros) - 1) >> zeros << zeros) < end).unwrap_or(0);
@@ -155,7 +156,7 @@ impl Bits for BitEncoder {
     }
 }
 
-/// Reads what a [`BitEncoder`] wrote. Beyond the end there are zeros.
+/// A decoder of the bits of a [`BitEncoder`]. Beyond the end all bytes are zeros.
 #[derive(Debug)]
 pub(in crate::packed) struct BitDecoder<'a> {
     bytes: &'a [u8],
@@ -200,7 +201,7 @@ mod tests {
     use super::*;
     use crate::support::rng::SplitMix64;
 
-    /// Codes a number in two ways.
+    /// A function that codes a number in two ways: with a sign, and as a positive number.
     type Coder<'c> = dyn FnMut(&mut SignedBitModel, &mut [BitModel], i32) -> (i32, u32) + 'c;
 
     #[test]

@@ -1,4 +1,4 @@
-//! The entropy coder by itself, for the fuzz targets. No part of the crate's interface.
+//! The entropy coder alone, for the fuzz targets. It is not part of the crate's interface.
 
 use crate::packed::Packed;
 use crate::packed::bitstream::head::Head;
@@ -10,14 +10,15 @@ use crate::packed::entropy::symbols::LANES;
 use crate::packed::entropy::tables::{Lookup, Tables};
 use crate::scene::sh::ShDegree;
 
-/// Bytes of an entry of a script of [`decode`].
+/// Number of bytes of an entry of a script of [`decode`].
 const ENTRY: usize = 5;
 
-/// Reads `tables`, and with them `range`, of up to 16 lanes. Each five bytes of `script` say what is read next, in which
-/// contexts and for which lanes. Returns whether everything was read to its end, and not beyond.
+/// Decodes `range`, of 1 to 16 lanes, with `tables`. Each five bytes of `script` say what is decoded next, in which
+/// contexts and for which lanes. Returns whether everything was decoded to the end of the range, and not beyond.
 ///
 /// # Panics
-/// If tables that were read are not the same once written and read again, or if the bits that were read cannot be counted.
+/// If tables that were read are not the same after they are written and read again, or if the bits that were read cannot be
+/// counted.
 #[must_use]
 pub fn decode(tables: &[u8], range: &[u8], lanes: u8, script: &[u8]) -> bool {
     let Some(tables) = Tables::read(tables) else { return false };
@@ -37,10 +38,10 @@ pub fn decode(tables: &[u8], range: &[u8], lanes: u8, script: &[u8]) -> bool {
     player.exhausted()
 }
 
-/// What [`round_trip`] codes next: kind, set of contexts, context, lanes and value.
+/// An entry of a script of [`round_trip`]: kind, set of contexts and context; lanes; value.
 pub type Entry = ([u8; 3], u16, u64);
 
-/// Codes what a script asks for in `lanes` lanes, and decodes it. Returns whether it came back and nothing was left.
+/// Encodes a script in 1 to 16 lanes, and decodes it. Returns whether all values came back and no bytes were left.
 #[must_use]
 pub fn round_trip(lanes: u8, script: &[Entry]) -> bool {
     let lanes = 1 + usize::from(lanes) % LANES;
@@ -60,12 +61,13 @@ pub fn round_trip(lanes: u8, script: &[Entry]) -> bool {
     let Some(read) = Tables::read(&tables.write()) else { return false };
     let lookup = Lookup::new(&read);
     let Some(mut player) = SymbolDecoder::new(&lookup, &range, lanes, false) else { return false };
-    // Decodes everything, even after a difference.
+    // All values are decoded, even after a difference.
     let decoded: Vec<[u64; LANES]> = asks.iter().map(|a| ask(&mut player, a)).collect();
     decoded == coded && player.exhausted()
 }
 
-/// The input of [`decode`]: the tables and the first range of a packed scene, empty if there are none.
+/// Returns the input of [`decode`]: the tables and the first range of a packed scene. Both are empty if the head cannot be
+/// read.
 #[must_use]
 pub fn parts(packed: &Packed) -> [Vec<u8>; 2] {
     let Some(head) = Head::read(&packed.head().bytes, packed.head().degree.rest()) else {
@@ -78,7 +80,8 @@ pub fn parts(packed: &Packed) -> [Vec<u8>; 2] {
     [head.tables, packed.data().get(..length.unwrap_or(0)).unwrap_or_default().to_vec()]
 }
 
-/// `head`, of a scene of this degree, with the checksums of the ranges of `data`; `None` if it cannot be read.
+/// Returns `head` with the checksums of the ranges of `data`. `degree` is the SH degree of the scene. `None` if the head
+/// cannot be read.
 #[must_use]
 pub fn resealed(head: &[u8], degree: ShDegree, data: &[u8]) -> Option<Vec<u8>> {
     let mut head = Head::read(head, degree.rest())?;
@@ -90,12 +93,13 @@ pub fn resealed(head: &[u8], degree: ShDegree, data: &[u8]) -> Option<Vec<u8>> {
     Some(head.write())
 }
 
-/// Gaussians up to which chunks are copied.
+/// Number of Gaussians of a scene from which on chunks are not copied.
 const MOST_COPIED: usize = 1 << 12;
 
-/// `head`, of a scene of this degree, and `data` with a change of chunks or ranges: one more, one fewer, others first, longer
-/// and shorter ones, or elsewhere. Checksums of ranges are not changed. Returns head, data and number of Gaussians, or `None`
-/// if there is nothing to change. `below` gives numbers below another.
+/// Changes the chunks or the ranges of a scene of `head` and `data`: copies or removes a chunk, swaps two ranges, moves
+/// bytes from one range to another, or changes the cell and the bounds of a chunk. Checksums of ranges are not changed.
+/// Returns the head, the data and the number of Gaussians; `None` if there is nothing to change. `below(n)` returns a
+/// number below `n`.
 #[must_use]
 pub fn rearranged(
     head: &[u8],

@@ -1,4 +1,4 @@
-//! The form of a table of probabilities in a file: logarithms of the probabilities, of which the differences are coded.
+//! Tables of probabilities as a file holds them: logarithms, whose differences are coded.
 
 use crate::packed::bitstream::streams::Stream;
 use crate::packed::entropy::adaptive_bits::{BitModel, Bits, SignedBitModel};
@@ -6,20 +6,20 @@ use crate::packed::entropy::adaptive_bits::{BitModel, Bits, SignedBitModel};
 /// Binary logarithms of the numbers of levels an octave that a table may have.
 const GRAINS: std::ops::RangeInclusive<u32> = 0..=3;
 const FINEST: u32 = *GRAINS.end();
-/// Weights at the levels of the lowest octave.
+/// Weights at the 8 finest levels of the lowest octave.
 const WEIGHTS: [u32; 1 << FINEST] = [32, 35, 38, 41, 45, 49, 54, 59];
-/// Whole numbers below this are their own symbols. The next symbol stands for 8 of them: 3 octaves.
+/// Integers below this are their own symbols. The next symbol stands for 8 integers, which are 3 octaves.
 const DIRECT: usize = 16;
 const FIRST_OF_MANY: u32 = 3;
-/// Largest number of symbols of a table, and bits of that number, and one.
+/// Largest number of symbols of a table, and the number of its bits.
 pub(in crate::packed) const MAX_SYMBOLS: usize = 256;
 const COUNT_BITS: usize = 9;
-/// Bits of the first level at one level an octave.
+/// Number of bits of the level of the first symbol, at one level an octave.
 const FIRST_BITS: u32 = 4;
 /// Largest difference of levels that the encoder tries.
 const MOST_DELTA: usize = 24;
 
-/// What the symbols of a stream stand for.
+/// The meaning of the symbols of a stream: names without order, integers, integers with a sign, or gaps between cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::packed) enum Kind {
     Names,
@@ -41,28 +41,28 @@ impl Kind {
         }
     }
 
-    /// The symbol that the probability of symbol `i` is predicted from.
+    /// Returns the symbol from which the probability of symbol `i` is predicted.
     fn parent(self, i: usize) -> usize {
         if self == Self::Signed && (2..DIRECT).contains(&i) { i - 2 } else { i.saturating_sub(1) }
     }
 
-    /// By how many octaves symbol `i` is likelier than its parent.
+    /// Returns the number of octaves by which symbol `i` is expected to be likelier than its parent.
     fn gain(self, i: usize) -> u32 {
         if i == DIRECT && self != Self::Names { FIRST_OF_MANY } else { 0 }
     }
 }
 
-/// A table: minus the binary logarithms of the probabilities, in levels.
+/// A table: the negative binary logarithms of probabilities, in levels.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct LogProbabilities {
     /// Binary logarithm of the number of levels an octave.
     grain: u32,
-    /// The level of each symbol, and whether the symbol occurs. The last symbol occurs. A symbol that does not occur has the level
-    /// that is predicted for it, since levels of later symbols are predicted from it.
+    /// The level of each symbol, and whether the symbol occurs. The last symbol always occurs. A symbol that does not occur
+    /// has the level that is predicted for it, since levels of later symbols are predicted from it.
     symbols: Vec<(u32, bool)>,
 }
 
-/// The odds of what tables consist of.
+/// The adaptive probabilities of the parts of tables.
 #[derive(Debug, Default)]
 pub(in crate::packed) struct LevelBitModels {
     counts: [[BitModel; COUNT_BITS + 1]; 4],
@@ -72,8 +72,8 @@ pub(in crate::packed) struct LevelBitModels {
 }
 
 impl LogProbabilities {
-    /// Codes a table of probabilities of `precision` bits. The decoder gives an empty one. `None` for what no encoder
-    /// writes.
+    /// Codes a table of probabilities of `precision` bits. A decoder codes an empty table and gets the decoded one. `None`
+    /// for tables that no encoder writes.
     pub(in crate::packed) fn code(
         &self,
         bits: &mut dyn Bits,
@@ -122,7 +122,8 @@ impl LogProbabilities {
         Some(Self { grain, symbols })
     }
 
-    /// The weights of the symbols, below 2^19, of a table of probabilities of `precision` bits.
+    /// Returns the weight of each symbol, which is below 2^19. The probabilities have `precision` bits. A symbol that does
+    /// not occur has the weight 0.
     pub(in crate::packed) fn weights(&self, precision: u32) -> Vec<u32> {
         let weight = |level: u32| {
             let up = (precision << FINEST) - (level << (FINEST - self.grain)).min(precision << FINEST);
@@ -131,7 +132,8 @@ impl LogProbabilities {
         self.symbols.iter().map(|&(level, occurs)| if occurs { weight(level) } else { 0 }).collect()
     }
 
-    /// The table with which `counts` and the table take the fewest bits, and about how many. The last count is not zero.
+    /// Returns the table for which `counts` and the table itself take the fewest bits, and an estimate of these bits. The
+    /// last count must not be 0. Only numbers of levels in `grains` are tried.
     pub(in crate::packed) fn fit(
         counts: &[u32],
         kind: Kind,
@@ -143,7 +145,7 @@ impl LogProbabilities {
         all.unwrap_or((Self { grain: 0, symbols: Vec::new() }, 0.0))
     }
 
-    /// The grains worth trying for `counts`.
+    /// Returns the numbers of levels an octave that are worth trying for `counts`, as binary logarithms.
     pub(in crate::packed) fn grains(counts: &[u32]) -> std::ops::RangeInclusive<u32> {
         let used = counts.iter().filter(|&&count| count > 0).count().max(1);
         let each = counts.iter().map(|&count| u64::from(count)).sum::<u64>() / used as u64;
@@ -156,23 +158,24 @@ impl LogProbabilities {
     }
 }
 
-/// About the bits of a difference of levels, and of whether a symbol occurs where the one that it is predicted from does
-/// and does not.
+/// Returns an estimate of the bits of a difference of levels. [`OCCURS`] has estimates of the bits that say whether a
+/// symbol occurs, by whether its parent occurs and whether it does.
 fn delta_bits(delta: usize) -> f32 {
     let length = (usize::BITS - delta.leading_zeros()) as f32;
     if delta == 0 { 0.8 } else { 2.3 + 2.2 * (length - 1.0) }
 }
 const OCCURS: [[f32; 2]; 2] = [[0.5, 1.8], [3.0, 0.2]];
-/// About the bits of a table that do not depend on the symbols.
+/// Estimate of the bits of a table that do not depend on its symbols.
 const TABLE_BITS: f32 = 9.0;
 
-/// The search for the best levels: a tree, of which the best levels below each symbol are found first.
+/// The search for the best levels. Symbols are a tree by their parents, and the best levels below each symbol are found
+/// first.
 struct Fit<'a> {
     counts: &'a [u32],
     kind: Kind,
     grain: u32,
     levels: usize,
-    /// Of each symbol and level the bits of it and all below.
+    /// For each symbol, each level, and whether the symbol occurs: the bits of the symbol and of all symbols below it.
     bits: Vec<Vec<[f32; 2]>>,
 }
 
@@ -180,7 +183,7 @@ impl<'a> Fit<'a> {
     fn new(counts: &'a [u32], kind: Kind, precision: u32, grain: u32) -> Self {
         let levels = ((precision << grain) + 1) as usize;
         let total: f32 = counts.iter().map(|&count| count as f32).sum();
-        // A level's probability takes part of those of all others.
+        // Probabilities are divided by the sum of all, so the probability at a level takes a part of all others.
         let part: Vec<f32> = (0..levels)
             .map(|level| {
                 total * libm::exp2f(-(level as f32) / (1_u32 << grain) as f32) * std::f32::consts::LOG2_E
@@ -203,8 +206,8 @@ impl<'a> Fit<'a> {
         fit
     }
 
-    /// The best choice of symbol `i` and all below where its parent has this level and occurs or not: bits, level, and
-    /// whether it occurs.
+    /// Returns the best choice of symbol `i` and of all symbols below it, if its parent has the level `parent` and occurs
+    /// if `there` is 1: the bits, the level, and whether symbol `i` occurs.
     fn choice(&self, i: usize, parent: usize, there: usize) -> (f32, usize, bool) {
         let expected = parent.saturating_sub((self.kind.gain(i) << self.grain) as usize);
         let absent = self.bits[i][expected][0] + OCCURS[there][0];

@@ -8,26 +8,27 @@ use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
 use crate::packed::entropy::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
 use crate::support::simd::Simd;
 
-/// The decoder of a range.
+/// A decoder of the symbols and raw bits of a range.
 #[derive(Debug)]
 pub(in crate::packed) struct SymbolDecoder<'a> {
     pub(in crate::packed) lookup: &'a Lookup,
-    /// Words of 16 bits, at least two.
+    /// Words of 16 bits. There are at least two.
     pub(in crate::packed) words: &'a [[u8; 2]],
     pub(in crate::packed) states: Lanes<u32>,
-    /// Next word of each lane, and the end of its words.
+    /// Index of the next word of each lane, and the end of the lane's words.
     pub(in crate::packed) next: Lanes<u32>,
     ends: Lanes<u32>,
-    /// Vector instructions of the look-ups.
+    /// Vector instructions for the look-ups.
     simd: Simd,
-    /// Whether something was asked for that no encoder writes.
+    /// Whether symbols of a set of contexts without tables were asked for, which no encoder writes.
     pub(in crate::packed) damaged: bool,
-    /// Bits of each stream, if they are counted.
+    /// Number of bits of each stream, if bits are counted.
     pub(in crate::packed) bit_counts: Option<BitCounts>,
 }
 
 impl<'a> SymbolDecoder<'a> {
-    /// `None` if `bytes` cannot be a range of this many lanes. Bits of streams are counted if `count_bits`.
+    /// Creates a decoder. `None` if `bytes` cannot be a range of `lanes` lanes. With `count_bits`, the bits of streams are
+    /// counted.
     pub(in crate::packed) fn new(
         lookup: &'a Lookup,
         bytes: &'a [u8],
@@ -67,20 +68,21 @@ impl<'a> SymbolDecoder<'a> {
         Some(player)
     }
 
-    /// Whether nothing was asked for that no encoder writes, and no lane was read beyond its end.
+    /// Returns whether the range can still be the output of an encoder: no symbol without a table was asked for, and no
+    /// lane was read beyond its end.
     pub(in crate::packed) fn good(&self) -> bool {
         !self.damaged && self.next.iter().zip(&self.ends).all(|(next, end)| next <= end)
     }
 
-    /// Whether every lane was read to its end and not beyond, and holds what an encoder leaves.
+    /// Returns whether every lane was read exactly to its end, and is in the state from which an encoder starts.
     pub(in crate::packed) fn exhausted(&self) -> bool {
         !self.damaged && self.states == [LEAST; LANES] && self.next == self.ends
     }
 
-    /// The next symbol of each lane that is not [`IDLE`], by the table of its context.
+    /// Takes the next symbol of each lane whose context is not [`IDLE`], by the table of the context.
     ///
-    /// It is called and not inlined: the walk has dozens of places that take symbols, and with this in each of them it
-    /// would not fit into the cache of instructions.
+    /// It must not be inlined. The walk takes symbols in dozens of places, and with this code in each of them it would not
+    /// fit into the instruction cache.
     #[inline(never)]
     fn take<const PRECISION: u32>(&mut self, number: usize, context: &Lanes<u32>, set: u32) -> Lanes<u32> {
         let Some(tables) = self.lookup.set(number) else {
@@ -94,7 +96,7 @@ impl<'a> SymbolDecoder<'a> {
         simd.run(Take::<PRECISION> { player: self, tables, context, set })
     }
 
-    /// [`Self::take`] lane by lane.
+    /// Does the work of [`Self::take`] lane by lane.
     #[inline(always)]
     fn take_few<const PRECISION: u32>(
         &mut self,
@@ -115,7 +117,7 @@ impl<'a> SymbolDecoder<'a> {
         out
     }
 
-    /// Adds the bits of the symbols that are taken next.
+    /// Counts the bits of the symbols that are taken next.
     #[cold]
     #[inline(never)]
     fn count(&mut self, slot: Slot, context: &Lanes<u32>, set: u32) {
@@ -130,14 +132,14 @@ impl<'a> SymbolDecoder<'a> {
         }
     }
 
-    /// The next `count` raw bits of each lane, at most 16. Lanes that are not in use have none.
+    /// Takes the next `count` raw bits of each lane, at most 16. The count of a lane that is not in use is 0.
     #[inline(never)]
     fn take_bits(&mut self, count: &Lanes<u32>) -> Lanes<u32> {
         let simd = self.simd;
         simd.run(TakeBits { player: self, count })
     }
 
-    /// Adds raw bits that are taken next.
+    /// Counts raw bits that are taken next.
     #[cold]
     #[inline(never)]
     fn count_raw(&mut self, slot: Slot, count: &Lanes<u32>, set: u32) {
@@ -147,7 +149,7 @@ impl<'a> SymbolDecoder<'a> {
     }
 }
 
-/// The work of [`SymbolDecoder::take`]. All but the look-ups is done in vector registers.
+/// The work of [`SymbolDecoder::take`]. Everything but the look-ups is done in vector registers.
 struct Take<'p, 'l, const PRECISION: u32> {
     player: &'p mut SymbolDecoder<'l>,
     tables: Set<'l>,
@@ -170,7 +172,7 @@ impl<const PRECISION: u32> pulp::NullaryFnOnce for Take<'_, '_, PRECISION> {
 }
 
 impl<const PRECISION: u32> Take<'_, '_, PRECISION> {
-    /// Takes the symbols of half of the lanes, which fill a vector register, from lane `FIRST` on.
+    /// Takes the symbols of half of the lanes, from lane `FIRST` on. They fill a vector register.
     #[inline(always)]
     fn half<const FIRST: usize>(&mut self, out: &mut Lanes<u32>) {
         let mut entries = [0; HALF];
@@ -207,7 +209,7 @@ impl pulp::NullaryFnOnce for TakeBits<'_, '_> {
 }
 
 impl SymbolDecoder<'_> {
-    /// Takes words into the states of half of the lanes that have room for one.
+    /// Moves a word into each state of half of the lanes that has room for one.
     #[inline(always)]
     fn refill_half<const FIRST: usize>(&mut self) {
         let words = self.next_words::<FIRST>();
@@ -215,7 +217,7 @@ impl SymbolDecoder<'_> {
         refill(states, next, &words);
     }
 
-    /// The next word of each lane of a half.
+    /// Returns the next word of each lane of half of the lanes.
     #[inline(always)]
     fn next_words<const FIRST: usize>(&self) -> [u32; HALF] {
         let mut words = [0; HALF];
@@ -225,7 +227,7 @@ impl SymbolDecoder<'_> {
         words
     }
 
-    /// The states of a half of the lanes, and the numbers of their next words.
+    /// Returns the states of half of the lanes, and the indices of their next words.
     #[inline(always)]
     fn half_mut<const FIRST: usize>(&mut self) -> (&mut [u32; HALF], &mut [u32; HALF]) {
         let (states, next) = (self.states.as_chunks_mut().0, self.next.as_chunks_mut().0);
@@ -233,8 +235,8 @@ impl SymbolDecoder<'_> {
     }
 }
 
-/// Takes symbols from states, and words into those that have room for one. Returns the symbols.
-// Inlined between look-ups of single numbers, WebAssembly would not get vectors.
+/// Takes a symbol from each state, and moves a word into each state that has room for one. Returns the symbols.
+// Where this code is inlined between look-ups of single numbers, WebAssembly gets no vector code for it.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn advance<const PRECISION: u32>(
@@ -252,7 +254,7 @@ fn advance<const PRECISION: u32>(
     out
 }
 
-/// Takes words into states that have room for one.
+/// Moves a word into each state that has room for one.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn refill(states: &mut [u32; HALF], next: &mut [u32; HALF], words: &[u32; HALF]) {
@@ -261,32 +263,32 @@ fn refill(states: &mut [u32; HALF], next: &mut [u32; HALF], words: &[u32; HALF])
     }
 }
 
-/// The state after a symbol.
+/// Returns the state after a symbol is taken.
 #[inline(always)]
 fn after<const PRECISION: u32>(state: u32, entry: Entry) -> u32 {
     let rest = state >> PRECISION;
     rest.wrapping_mul(less_share(entry)).wrapping_add(rest.wrapping_add(over(entry)))
 }
 
-/// A word by its number. Beyond the end of the words there is anything.
+/// Returns the word with the index `number`. Beyond the end it may be any number.
 #[inline(always)]
 fn word(words: &[[u8; 2]], number: u32) -> u32 {
     u16::from_le_bytes(words.get(number as usize).copied().unwrap_or_default()).into()
 }
 
-/// A state and the number of its lane's next word, after that word is taken if there is room for it.
+/// Returns a state and the index of the lane's next word, after the word is moved into the state if there is room.
 #[inline(always)]
 fn refilled(state: u32, next: u32, word: u32) -> (u32, u32) {
     let low = state < LEAST;
     (if low { state << 16 | word } else { state }, next.wrapping_add(u32::from(low)))
 }
 
-/// Half of the lanes.
+/// Number of lanes of half of the lanes.
 const HALF: usize = LANES / 2;
-/// Of so many lanes symbols are taken one by one. The others are idle.
+/// Largest number of busy lanes for which symbols are taken lane by lane.
 const FEW: u32 = 3;
 
-/// Most words of a range.
+/// Largest number of words of a range.
 const MAX_WORDS: u32 = 1 << 30;
 
 impl Symbols for SymbolDecoder<'_> {

@@ -6,14 +6,15 @@ use crate::packed::bitstream::streams::Slot;
 use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, has};
 use crate::packed::entropy::tables::{Model, Tables};
 
-/// Least state between symbols. A lane begins and, decoded, ends with it.
+/// Least state between symbols. An encoder starts each lane with it, and a decoder ends with it.
 pub(in crate::packed) const LEAST: u32 = 1 << 16;
-/// Most raw bits that a state gives at once.
+/// Largest number of raw bits that pass through a state at once.
 pub(in crate::packed) const MOST_BITS: u32 = 16;
-/// Ranges of fewer bytes have lanes of which 16 bits count the words.
+/// Least number of bytes of a range whose lanes count their words in 32 bits. In shorter ranges it is 16 bits.
 const LEAST_LONG: usize = 1 << 17;
 
-/// Bytes of the number of words of a lane in a range of this many bytes. As many or more remain if numbers get longer.
+/// Returns the number of bytes of a lane's number of words, in a range of `range` bytes. Longer numbers make a range
+/// longer, so the result stays the same with their bytes included.
 pub(in crate::packed) fn length_bytes(range: usize) -> usize {
     if range < LEAST_LONG { 2 } else { 4 }
 }
@@ -21,14 +22,14 @@ pub(in crate::packed) fn length_bytes(range: usize) -> usize {
 /// Marks a recorded entry as raw bits.
 const RAW: u32 = 1 << 31;
 
-/// The encoder of a range. It keeps everything until the tables are known.
+/// The encoder of a range. It records all symbols and raw bits, since tables are known only later.
 #[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct SymbolRecorder {
-    /// Of each lane: symbols with their contexts, or up to 16 raw bits with their number and stream.
+    /// The entries of each lane: a symbol with its context, or up to 16 raw bits with their number and stream.
     lanes: [Vec<u32>; LANES],
 }
 
-/// A recorded symbol.
+/// Returns the entry of a symbol.
 fn symbol_entry(context: usize, symbol: u32) -> u32 {
     (context as u32) << 8 | symbol
 }
@@ -64,13 +65,13 @@ impl Symbols for SymbolRecorder {
     }
 }
 
-/// Raw bits are taken in pieces of at most [`MOST_BITS`], low ones first.
+/// Splits `count` raw bits into pieces of at most [`MOST_BITS`], low bits first.
 fn pieces(count: u32) -> impl Iterator<Item = u32> {
     [count.min(MOST_BITS), count.saturating_sub(MOST_BITS)].into_iter().filter(|&piece| piece > 0)
 }
 
 impl SymbolRecorder {
-    /// Hands every symbol and its context to `count`, and every piece of raw bits, its stream and its length to `raw`.
+    /// Calls `count(context, symbol)` for every symbol, and `raw(stream, length)` for every piece of raw bits.
     pub(in crate::packed) fn each(&self, mut count: impl FnMut(usize, u8), mut raw: impl FnMut(usize, u32)) {
         for &entry in self.lanes.iter().flatten() {
             if entry & RAW == 0 {
@@ -81,20 +82,20 @@ impl SymbolRecorder {
         }
     }
 
-    /// Whether `tables` have all symbols.
+    /// Returns whether `tables` have all recorded symbols.
     pub(in crate::packed) fn is_within(&self, tables: &Tables) -> bool {
         let share = |entry: u32| tables.share((entry >> 8) as usize, entry.to_le_bytes()[0]);
         let has = |&entry: &u32| entry & RAW != 0 || share(entry).is_some();
         self.lanes.iter().flatten().all(has)
     }
 
-    /// All entries, lane by lane, to be [put back](Self::restore) later.
+    /// Returns all entries, lane by lane. [`Self::restore`] makes a recorder of them.
     #[cfg(test)]
     pub(in crate::packed) fn entries(&self) -> &[Vec<u32>; LANES] {
         &self.lanes
     }
 
-    /// A recorder with the entries of another.
+    /// Creates a recorder with the entries of another.
     #[cfg(test)]
     pub(in crate::packed) fn restore(entries: Vec<Vec<u32>>) -> Self {
         let mut lanes: [Vec<u32>; LANES] = Default::default();
@@ -104,7 +105,8 @@ impl SymbolRecorder {
         Self { lanes }
     }
 
-    /// The bytes of the range: the numbers of words of all lanes in use but the last, and the words.
+    /// Encodes the range with `tables`. Returns its bytes: the number of words of each lane in use but the last, followed
+    /// by the words.
     pub(in crate::packed) fn finish(&self, tables: &Tables, lanes: usize) -> Vec<u8> {
         let words: Vec<Vec<u16>> = self.lanes.iter().take(lanes).map(|lane| encode(lane, tables)).collect();
         let lengths = words.iter().take(lanes.saturating_sub(1)).map(Vec::len);
@@ -118,7 +120,7 @@ impl SymbolRecorder {
     }
 }
 
-/// The words of a lane, in the order in which they are read.
+/// Encodes a lane. Returns its words in the order in which they are read.
 fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
     let mut words = Vec::new();
     let mut state = LEAST;
@@ -128,7 +130,7 @@ fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
             *state >>= 16;
         }
     };
-    // The coder is a stack: what is coded last is decoded first.
+    // The coder is a stack: the last symbol that is encoded is the first to be decoded.
     for &entry in lane.iter().rev() {
         if entry & RAW == 0 {
             let context = (entry >> 8) as usize;

@@ -1,18 +1,19 @@
-//! Shifts by a number of its own in each lane.
+//! Shifts by different numbers of bits in each lane.
 //!
-//! WebAssembly shifts all lanes of a vector by the same number, and the compiler takes vectors apart for anything else. There
-//! a power of two is made as the exponent of a float, and a shift is a product with it. All ways give the same bits.
+//! WebAssembly shifts all lanes of a vector by the same number, and the compiler splits vectors for any other shift. There
+//! a power of two is made as the exponent of a float, and a shift is a product with a power of two. Both ways give the same
+//! bits.
 
 use crate::packed::entropy::symbols::{Lanes, each};
 
 /// Largest shift.
 pub(in crate::packed) const MOST_SHIFT: u32 = 16;
-/// Adding this number, 2^23, leaves a smaller whole number as the mantissa.
+/// 2^23. Adding it to a smaller integer, as a float, leaves the integer in the mantissa.
 const WHOLE: f32 = 8_388_608.0;
 
 const NONE_IN_VECTORS: bool = cfg!(target_arch = "wasm32");
 
-/// 2^n for n up to [`MOST_SHIFT`].
+/// Returns `2^n`, for `n` up to [`MOST_SHIFT`].
 #[inline(always)]
 pub(in crate::packed) fn power(n: u32) -> u32 {
     if NONE_IN_VECTORS { power_of_float(n) } else { 1 << n }
@@ -23,7 +24,7 @@ fn power_of_float(n: u32) -> u32 {
     (f32::from_bits((n + 127) << 23) + WHOLE).to_bits() - WHOLE.to_bits()
 }
 
-/// Each number shifted to the right by up to [`MOST_SHIFT`], rounded down.
+/// Returns each number shifted right by up to [`MOST_SHIFT`], rounded down.
 #[inline(always)]
 pub(in crate::packed) fn right(numbers: &Lanes, n: &Lanes<u32>) -> Lanes {
     if NONE_IN_VECTORS { right_by_product(numbers, n) } else { each(|l| numbers[l] >> n[l]) }
@@ -35,7 +36,7 @@ fn right_by_product(numbers: &Lanes, n: &Lanes<u32>) -> Lanes {
     each(|l| ((i64::from(numbers[l]) * i64::from(factor[l])) >> MOST_SHIFT) as i32)
 }
 
-/// [`right`] of numbers without sign.
+/// Returns each unsigned number shifted right by up to [`MOST_SHIFT`].
 #[inline(always)]
 pub(in crate::packed) fn right_unsigned(numbers: &Lanes<u32>, n: &Lanes<u32>) -> Lanes<u32> {
     if NONE_IN_VECTORS { right_unsigned_by_product(numbers, n) } else { each(|l| numbers[l] >> n[l]) }

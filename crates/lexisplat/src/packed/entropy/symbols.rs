@@ -1,15 +1,16 @@
-//! Runs of Gaussians that are coded side by side, and what encoder and decoder of a range have in common.
+//! Lanes, and the interface that the encoder and the decoder of a range share.
 
 use crate::packed::bitstream::streams::Slot;
 
-/// Runs of Gaussians of a chunk that are coded side by side, each with a state of its own. A symbol of a lane depends on
-/// the one before it, so a CPU is busy only with many lanes. Two vector registers of 256 bits hold one number of each.
+/// Largest number of lanes: runs of Gaussians of a chunk that are coded side by side, each with a state of its own. A
+/// symbol of a lane depends on the one before it, so only many lanes keep a CPU busy. Two vector registers of 256 bits hold
+/// a number of each lane.
 pub(in crate::packed) const LANES: usize = 16;
 
-/// One number of each lane. Numbers of lanes that are not in use mean nothing.
+/// One number of each lane. Numbers of lanes that are not in use have no meaning.
 pub(in crate::packed) type Lanes<T = i32> = [T; LANES];
 
-/// What `of` says of each lane. It is always inlined into vector code, which the methods of arrays are not.
+/// Returns `of(l)` for each lane `l`. This function is always inlined into vector code; the methods of arrays are not.
 #[inline(always)]
 pub(in crate::packed) fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> Lanes<T> {
     let mut out = [T::default(); LANES];
@@ -19,18 +20,18 @@ pub(in crate::packed) fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> Lan
     out
 }
 
-/// Whether `lane` is in `set`.
+/// Returns whether `lane` is in `set`.
 #[inline(always)]
 pub(in crate::packed) fn has(set: u32, lane: usize) -> bool {
     set & 1 << lane != 0
 }
 
-/// The encoder or the decoder of a range. The encoder records what the closures say of each lane, and returns it. The
-/// decoder returns what the range holds and never calls the closures. So one walk serves both.
+/// The encoder or the decoder of a range. The encoder calls a closure for the value of each lane, records the value, and
+/// returns it. The decoder returns the values of the range and never calls the closures. So one walk serves both.
 ///
 /// Only lanes in `set` are coded. The others get 0.
 pub(in crate::packed) trait Symbols {
-    /// Bytes that are modelled in `context`, one for each lane.
+    /// Codes one byte of each lane, with the probabilities of `context`.
     fn symbols(
         &mut self,
         slot: Slot,
@@ -39,10 +40,10 @@ pub(in crate::packed) trait Symbols {
         value: impl Fn(usize) -> u32,
     ) -> Lanes<u32>;
 
-    /// Numbers of `count` bits each, at most 32, that are not modelled.
+    /// Codes `count` raw bits of each lane, at most 32.
     fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32>;
 
-    /// Whole numbers: a token that is modelled, and for large ones bits that are not.
+    /// Codes integers: a token with the probabilities of `context`, followed by raw bits if the integer is large.
     #[inline(always)]
     fn integers(
         &mut self,
@@ -61,14 +62,14 @@ pub(in crate::packed) trait Symbols {
         each(|l| if tokens[l] < DIRECT { tokens[l] } else { (2 + (tokens[l] & 1)) << count[l] | low[l] })
     }
 
-    /// Whole numbers with a sign.
+    /// Codes integers with a sign.
     #[inline(always)]
     fn signed(&mut self, slot: Slot, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> i32) -> Lanes {
         let coded = self.integers(slot, context, set, |l| zigzag(value(l)));
         each(|l| unzigzag(coded[l]))
     }
 
-    /// Whole numbers below 2^63.
+    /// Codes integers below 2^63.
     #[inline(always)]
     fn wide(
         &mut self,
@@ -96,17 +97,18 @@ pub(in crate::packed) trait Symbols {
     }
 }
 
-/// The low 32 bits.
+/// Returns the low 32 bits of a number.
 fn low_half(x: u64) -> u32 {
     (x & u64::from(u32::MAX)) as u32
 }
 
-/// Whole numbers below this are their own token.
+/// Integers below this are their own token.
 const DIRECT: u32 = 16;
-/// Bits of the last number that is its own token.
+/// Number of bits of the last integer that is its own token.
 const DIRECT_BITS: u32 = 4;
 
-/// The token of a whole number: itself, or its bit length and the bit after the leading one.
+/// Returns the token of an integer: the integer itself if it is small, otherwise its length in bits and the bit after the
+/// leading one.
 pub(in crate::packed) fn token(value: u64) -> u32 {
     if value < u64::from(DIRECT) {
         return low_half(value);
@@ -115,19 +117,19 @@ pub(in crate::packed) fn token(value: u64) -> u32 {
     DIRECT + 2 * (length - DIRECT_BITS - 1) + low_half((value >> (length - 2)) & 1)
 }
 
-/// Number of bits that follow `token`.
+/// Returns the number of raw bits that follow `token`.
 #[inline(always)]
 pub(in crate::packed) fn low_bits(token: u32) -> u32 {
     if token < DIRECT { 0 } else { (token - DIRECT) / 2 + DIRECT_BITS - 1 }
 }
 
-/// Maps signed numbers to unsigned ones by magnitude: 0, -1, 1, -2, ...
+/// Maps integers with a sign to unsigned ones, by magnitude: 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
 #[inline(always)]
 pub(in crate::packed) fn zigzag(value: i32) -> u32 {
     ((value << 1) ^ (value >> 31)).cast_unsigned()
 }
 
-/// Inverse of [`zigzag`].
+/// Inverts [`zigzag`].
 #[inline(always)]
 pub(in crate::packed) fn unzigzag(value: u32) -> i32 {
     (value >> 1).cast_signed() ^ (value & 1).cast_signed().wrapping_neg()

@@ -1,4 +1,4 @@
-//! Tables of probabilities: made of counts, written, read, looked up.
+//! Tables of probabilities: fitting to counts, writing, reading and look-up.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,17 +6,17 @@ use crate::packed::bitstream::streams::{CONTEXTS, SLOTS, Slot};
 use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, BitModel, Bits};
 use crate::packed::entropy::log_probabilities::{Kind, LevelBitModels, LogProbabilities, MAX_SYMBOLS};
 
-/// About the bits of a table and of each of its symbols, by which contexts are joined first.
+/// Estimates of the bits of a table, and of each of its symbols, for the first pass that joins contexts.
 const TABLE_COST: f64 = 8.0;
 const SYMBOL_COST: f64 = 1.0;
-/// Levels an octave, as a binary logarithm, at which joined tables are compared.
+/// Binary logarithm of the number of levels an octave at which joined tables are compared.
 const JOINING_GRAIN: u32 = 1;
-/// The table of contexts that are never used.
+/// Number of the table of a context that is never used.
 const NONE: u8 = u8::MAX;
-/// Number of all contexts.
+/// Number of all contexts of all sets.
 pub(in crate::packed) const ALL_CONTEXTS: usize = SLOTS * CONTEXTS;
 
-/// How often each symbol occurs in one context.
+/// Counts of the symbols of one context.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(in crate::packed) struct Histogram {
     counts: Vec<u32>,
@@ -40,47 +40,48 @@ impl Histogram {
         }
     }
 
-    /// About the bits of all its symbols when coded with its own probabilities of `precision` bits, and of its table.
+    /// Returns an estimate of the bits of all counted symbols, coded with their own probabilities of `precision` bits, and
+    /// of their table.
     fn cost(&self, precision: u32) -> f64 {
         let total: u64 = self.counts.iter().map(|&c| u64::from(c)).sum();
         let total = total as f64;
         let mut bits = 0.0;
         for &count in self.counts.iter().filter(|&&c| c > 0) {
-            // A probability is at least one unit of precision.
+            // A probability is at least one unit of the precision.
             let share = (f64::from(count) / total).max(1.0 / f64::from(1_u32 << precision));
             bits -= f64::from(count) * libm::log2(share);
         }
         bits + TABLE_COST + SYMBOL_COST * self.counts.len() as f64
     }
 
-    /// The same, more exactly.
+    /// Returns a better estimate of the same bits, from a fitted table.
     fn fitted_cost(&self, kind: Kind, precision: u32) -> f64 {
         LogProbabilities::fit(&self.counts, kind, precision, JOINING_GRAIN..=JOINING_GRAIN).1
     }
 }
 
-/// Where a symbol's share of the states lies.
+/// The range of a state's low bits that stands for a symbol.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::packed) struct Model {
     pub(in crate::packed) start: u32,
     pub(in crate::packed) share: u32,
 }
 
-/// One table.
+/// One table of probabilities.
 #[derive(Debug, Clone)]
 struct Table {
-    /// What is written.
+    /// The table as it is written.
     levels: LogProbabilities,
-    /// Of each symbol; symbols that do not occur have no share.
+    /// The model of each symbol. A symbol that does not occur has a share of 0.
     models: Vec<Model>,
 }
 
 impl Table {
-    /// A table of probabilities of `precision` bits; `None` if there are no symbols or too many.
+    /// Makes a table of probabilities of `precision` bits. `None` if there are no symbols or too many.
     fn new(levels: LogProbabilities, precision: u32) -> Option<Self> {
         let whole = 1_u32 << precision;
         let weights = levels.weights(precision);
-        // Weights are below 2^19, so the total is below 2^27, and a product with the whole below 2^31.
+        // A weight is below 2^19, so the total is below 2^27, and a product of a weight with the whole is below 2^31.
         let total: u32 = weights.iter().sum();
         if total == 0 || weights.len() > MAX_SYMBOLS {
             return None;
@@ -89,7 +90,7 @@ impl Table {
             if weight == 0 { 0 } else { i64::from((weight * whole / total).max(1)) }
         };
         let mut shares: Vec<i64> = weights.iter().map(share).collect();
-        // The difference that rounding leaves goes to the most frequent symbols, where it costs least.
+        // The most frequent symbols take the difference that rounding leaves, since it costs least there.
         let mut left = i64::from(whole) - shares.iter().sum::<i64>();
         while left != 0 {
             let most = (0..shares.len()).max_by_key(|&k| (shares[k], std::cmp::Reverse(k)))?;
@@ -108,17 +109,18 @@ impl Table {
     }
 }
 
-/// All tables of a file, and the table of each context of each stream.
+/// All tables of a file, and the number of the table of each context.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Tables {
-    /// The table of every context, set by set; [`NONE`] for contexts that are never used.
+    /// The number of each context's table within its set; [`NONE`] for a context that is never used.
     map: Vec<u8>,
     /// The tables of each set of contexts.
     tables: Vec<Vec<Table>>,
 }
 
 impl Tables {
-    /// Joins contexts where a shared table costs less than two. `histograms` has [`ALL_CONTEXTS`] entries.
+    /// Makes tables for `histograms`, which has [`ALL_CONTEXTS`] entries. Contexts share a table where that costs less than
+    /// two tables.
     pub(in crate::packed) fn new(histograms: &[Histogram]) -> Option<Self> {
         let mut map = Vec::with_capacity(histograms.len());
         let mut tables = Vec::new();
@@ -138,24 +140,24 @@ impl Tables {
         Some(Self { map, tables })
     }
 
-    /// The table of a context, counted over all streams.
+    /// Returns the table of a context, by its number among all contexts.
     fn table(&self, context: usize) -> Option<&Table> {
         let table = *self.map.get(context)?;
         self.tables.get(context / CONTEXTS)?.get(usize::from(table))
     }
 
-    /// The model of a symbol, which was counted when the tables were made.
+    /// Returns the model of a symbol that was counted when the tables were made.
     pub(in crate::packed) fn model(&self, context: usize, symbol: u8) -> Model {
         self.share(context, symbol).unwrap_or(Model { start: 0, share: 1 })
     }
 
-    /// The same, if the symbol has a share in the context.
+    /// Returns the model of a symbol. `None` if the symbol does not occur in the context.
     pub(in crate::packed) fn share(&self, context: usize, symbol: u8) -> Option<Model> {
         let model = self.table(context)?.models.get(usize::from(symbol))?;
         (model.share > 0).then_some(*model)
     }
 
-    /// Bits of all symbols counted in `histogram` of a context.
+    /// Returns the number of bits of all symbols that `histogram` counts in a context.
     pub(in crate::packed) fn bits(&self, context: usize, histogram: &Histogram) -> f64 {
         let used = (0_u8..=u8::MAX).zip(&histogram.counts).filter(|(_, count)| **count > 0);
         let precision = Slot::stream_of(context).precision();
@@ -163,22 +165,22 @@ impl Tables {
         used.map(|(symbol, &count)| f64::from(count) * cost(symbol)).sum()
     }
 
-    /// Writes map and tables.
+    /// Returns the bytes of the numbers of tables of contexts, and of the tables.
     pub(in crate::packed) fn write(&self) -> Vec<u8> {
         let mut encoder = BitEncoder::default();
-        // What was made or read can be coded.
+        // Tables that were made or read can always be coded.
         let _ = self.code(&mut encoder);
         encoder.finish()
     }
 
-    /// Reads what [`Self::write`] wrote; `None` for anything else.
+    /// Reads the bytes that [`Self::write`] wrote; `None` for all other bytes.
     pub(in crate::packed) fn read(bytes: &[u8]) -> Option<Self> {
         let mut decoder = BitDecoder::new(bytes);
         let read = Self { map: Vec::new(), tables: Vec::new() }.code(&mut decoder)?;
         (read.write() == bytes).then_some(read)
     }
 
-    /// Codes map and tables. The decoder gives empty ones.
+    /// Codes the numbers of tables of contexts, and the tables. A decoder codes empty ones and gets the decoded ones.
     fn code(&self, bits: &mut dyn Bits) -> Option<Self> {
         let mut odds = TablesOdds::default();
         let mut all = Self { map: Vec::with_capacity(ALL_CONTEXTS), tables: Vec::with_capacity(SLOTS) };
@@ -194,7 +196,7 @@ impl Tables {
                 all.map.push(0);
                 for context in 1..CONTEXTS {
                     let wanted = self.map.get(slot.number * CONTEXTS + context).copied().unwrap_or(NONE);
-                    // A context that is not used has the table of the one before.
+                    // A context that is never used has the table of the context before.
                     let wanted = if wanted == NONE { last } else { usize::from(wanted) };
                     let same = &mut odds.same[usize::from(all.map.len() % CONTEXTS > 1 && odds.changed)];
                     odds.changed = bits.bit(same, wanted != last);
@@ -225,31 +227,31 @@ impl Tables {
     }
 }
 
-/// The odds of what maps and tables consist of.
+/// The adaptive probabilities of the parts of [`Tables`].
 #[derive(Debug, Default)]
 struct TablesOdds {
-    /// Whether a stream is used, where the one before is not and is.
+    /// Whether a set of contexts is used, by whether the set before is.
     used: [BitModel; 2],
-    /// Whether it has several tables.
+    /// Whether a set has several tables.
     many: BitModel,
-    /// Whether a context has another table than the one before, where that one had not and had.
+    /// Whether a context has another table than the context before, by whether that context had.
     same: [BitModel; 2],
     changed: bool,
-    /// Whether that table is new.
+    /// Whether the other table is one that no earlier context of the set has.
     new: BitModel,
     levels: LevelBitModels,
 }
 
-/// Contexts that share a table.
+/// A group of contexts that share a table.
 struct Group {
     histogram: Histogram,
-    /// In rising order.
+    /// The numbers of the contexts, in rising order.
     members: Vec<usize>,
     cost: f64,
 }
 
-/// Joins contexts until no two tables gain by being one. Returns the joined histograms in the order of their first
-/// contexts, and for each context the number of its histogram among them. Probabilities have `precision` bits.
+/// Joins contexts until no shared table costs less than two. Returns the histograms of the tables in the order of their
+/// first contexts, and for each context the number of its histogram. Probabilities have `precision` bits.
 fn join(contexts: &[Histogram], kind: Kind, precision: u32) -> (Vec<Histogram>, Vec<u8>) {
     let group = |context: usize| Group {
         histogram: contexts[context].clone(),
@@ -273,14 +275,14 @@ fn join(contexts: &[Histogram], kind: Kind, precision: u32) -> (Vec<Histogram>, 
     (groups.into_iter().map(|group| group.histogram).collect(), map)
 }
 
-/// Joins the two groups that gain most until none gain.
+/// Joins the two groups whose shared table saves most, until none saves bits.
 fn join_groups(groups: &mut Vec<Group>, cost: impl Fn(&Histogram) -> f64) {
     let joined = |a: &Group, b: &Group| {
         let mut sum = a.histogram.clone();
         sum.merge(&b.histogram);
         cost(&sum)
     };
-    // The cost of each pair, of which the second comes after the first.
+    // The cost of each pair of groups, the second of which comes after the first.
     let mut costs: Vec<Vec<f64>> = (0..groups.len())
         .map(|i| (i + 1..groups.len()).map(|j| joined(&groups[i], &groups[j])).collect())
         .collect();
@@ -313,18 +315,19 @@ fn join_groups(groups: &mut Vec<Group>, cost: impl Fn(&Histogram) -> f64) {
     }
 }
 
-/// Most bits of a probability.
+/// Largest number of bits of a probability.
 const MOST_PRECISION: u32 = 12;
-/// Places of the contexts of a set. It is a power of two, so that a masked number is one of them.
+/// Number of entries of a set: at least one for each context. It is a power of two, so that a masked number is a valid
+/// index.
 const PLACES: usize = CONTEXTS.next_power_of_two();
-/// The context of lanes that take no symbol. They get 0, and their states stay.
+/// The context of lanes that take no symbol. They get 0, and their states do not change.
 pub(in crate::packed) const IDLE: u32 = CONTEXTS as u32;
 
-/// The tables as a decoder looks symbols up: for each value of a state's low bits the symbol, its share less 1, and how
-/// far the value lies above the symbol's start.
+/// The tables in the form in which a decoder looks symbols up. For each value of a state's low bits there is an entry: the
+/// symbol, its share less 1, and the distance of the value from the start of the symbol.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Lookup {
-    /// Where the table of each context starts in `entries`, set by set.
+    /// The start of the table of each context in `entries`, set by set.
     sets: Vec<[u32; PLACES]>,
     entries: Vec<Entry>,
 }
@@ -333,9 +336,9 @@ impl Lookup {
     pub(in crate::packed) fn new(tables: &Tables) -> Self {
         let entry =
             |symbol: u32, share: u32, over: u32| symbol | (share - 1) << 8 | over << (8 + MOST_PRECISION);
-        // The first table stands for those that are missing. Its symbols take bits, so that states stay within limits.
+        // The first table stands for missing ones. Its symbols take bits, so that states stay within limits.
         let mut entries: Vec<u32> = (0..1 << MOST_PRECISION).map(|_| entry(0, 1, 0)).collect();
-        // With the next ones states stay as they are.
+        // With the tables that follow, states do not change.
         let mut idle = [0; MOST_PRECISION as usize + 1];
         for slot in Slot::all() {
             let precision = slot.stream.precision();
@@ -357,7 +360,7 @@ impl Lookup {
             let mut set = [idle[slot.stream.precision() as usize]; PLACES];
             let mut last = 0;
             for (start, &table) in set.iter_mut().zip(map) {
-                // A context that is not used has the table of the one before, as it is written.
+                // A context that is never used has the table of the context before, as in the written form.
                 last = if table == NONE { last } else { usize::from(table) };
                 *start = starts.get(last).copied().unwrap_or(0);
             }
@@ -366,7 +369,7 @@ impl Lookup {
         Self { sets, entries }
     }
 
-    /// The tables of a set of contexts; `None` if there are none.
+    /// Returns the tables of a set of contexts; `None` if the set has none.
     #[inline(always)]
     pub(in crate::packed) fn set(&self, number: usize) -> Option<Set<'_>> {
         let starts = self.sets.get(number)?;
@@ -381,11 +384,11 @@ pub(in crate::packed) struct Set<'l> {
     entries: &'l [Entry],
 }
 
-/// What a table says of a state's low bits.
+/// The entry of a table for one value of a state's low bits.
 pub(in crate::packed) type Entry = u32;
 
 impl Set<'_> {
-    /// What the table of `context`, which is below [`CONTEXTS`] or [`IDLE`], says of `low`.
+    /// Returns the entry for `low` in the table of `context`, which is below [`CONTEXTS`] or is [`IDLE`].
     #[inline(always)]
     pub(in crate::packed) fn entry(&self, context: u32, low: u32) -> Entry {
         let start = self.starts[context as usize % PLACES];
@@ -393,19 +396,19 @@ impl Set<'_> {
     }
 }
 
-/// The symbol.
+/// Returns the symbol of an entry.
 #[inline(always)]
 pub(in crate::packed) fn symbol(entry: Entry) -> u32 {
     entry & 0xff
 }
 
-/// Its share less 1.
+/// Returns the share of an entry's symbol, less 1.
 #[inline(always)]
 pub(in crate::packed) fn less_share(entry: Entry) -> u32 {
     entry >> 8 & ((1 << MOST_PRECISION) - 1)
 }
 
-/// How far the low bits lie above its start.
+/// Returns the distance of the low bits from the start of the entry's symbol.
 #[inline(always)]
 pub(in crate::packed) fn over(entry: Entry) -> u32 {
     entry >> (8 + MOST_PRECISION)
@@ -418,7 +421,7 @@ mod tests {
     use super::*;
     use crate::support::rng::SplitMix64;
 
-    /// Histograms of values that get rarer with their size, of which each context has its own.
+    /// Returns histograms of values that become rarer with their size. Each context has its own.
     fn histograms(symbols: u32) -> Vec<Histogram> {
         let mut rng = SplitMix64::new(11);
         let mut all = vec![Histogram::default(); ALL_CONTEXTS];
@@ -472,7 +475,7 @@ mod tests {
         for _ in 0..200 {
             let mut damaged = bytes.clone();
             damaged[rng.below(bytes.len())] ^= 1 << rng.below(8);
-            // What is read of damage is what those bytes are written for.
+            // If damaged bytes are accepted, the tables that are read are written as the same bytes.
             assert!(Tables::read(&damaged).is_none_or(|tables| tables.write() == damaged));
         }
     }

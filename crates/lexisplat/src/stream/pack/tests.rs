@@ -16,7 +16,7 @@ fn options() -> PackOptions {
     PackOptions { keep_order: true, atoms: Some(12), ..PackOptions::default() }
 }
 
-/// Draws nothing: says what its functions say.
+/// An observer that draws nothing. Its methods return the results of the given functions.
 struct Told<J, R = fn(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>>> {
     judge: J,
     refit: Option<R>,
@@ -77,7 +77,7 @@ fn streamed_with(
     done.map(|done| (std::fs::read(output).unwrap(), done))
 }
 
-/// Everything fits in one bucket and is of the sample: then nothing is left to differ.
+/// If all Gaussians are in one bucket and in the sample, no step can find other values than the packer.
 #[test]
 fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
     for count in [MOST_CHUNK + 500, 700, 0] {
@@ -85,7 +85,7 @@ fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
         let total = guessed_total(0.0, &splats.geometry) / SHOWN;
         let sensitivity = Sensitivity::guess_of_part(&splats.geometry, total);
         let (found, done) = streamed(&splats, None, BUCKET).unwrap();
-        // A judge that says of each Gaussian what the guess says.
+        // A judge whose sensitivity of each Gaussian is the guessed one.
         let mut told = Told::by(|part: &Splats| {
             assert_eq!(part.len(), splats.len());
             Ok(Sensitivity::guess_of_part(&part.geometry, total))
@@ -104,7 +104,7 @@ fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
     }
 }
 
-/// Without every fifth Gaussian pictures stay as they are.
+/// The sensitivity of pictures that do not change without every fifth Gaussian.
 fn shown(part: &Splats, total: f64) -> Sensitivity {
     let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
     let mut sensitivity = Sensitivity::guess_of_part(&part.geometry, total);
@@ -128,7 +128,7 @@ fn what_is_not_worth_its_bits_is_left_out() {
     let (found, done) = streamed_with(&splats, Some(&mut told), &options, BUCKET).unwrap();
     assert!(found == expected);
     assert!(done.head.removed >= (splats.len() / 5) as u64, "{}", done.head.removed);
-    // Chunks are filled from several buckets, and rows stay together.
+    // Chunks get Gaussians of several buckets, and the values of a Gaussian stay together.
     let small = 9000;
     let mut told = Told::by(|part: &Splats| Ok(shown(part, total)));
     let (found, done) = streamed_with(&splats, Some(&mut told), &options, small).unwrap();
@@ -158,7 +158,7 @@ fn appearances_are_fitted_part_by_part() {
     };
     let fitted = |options: &PackOptions, bucket: usize| {
         let refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
-            // The part has what the file leaves out, and the rest is in order.
+            // The part also has the Gaussians that the file leaves out, and the others are in order.
             assert!(part.len() > model.len() || options.keep_order);
             assert_eq!(model.len(), weights.len());
             Ok(Some(others(model)))
@@ -213,7 +213,7 @@ fn buckets_make_a_file_that_is_as_good() {
     let ratio = found.len() as f64 / whole.len() as f64;
     assert!((0.97..1.03).contains(&ratio), "{ratio}");
     let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
-    // The order was kept, so each Gaussian is where it was.
+    // The order was kept, so each Gaussian is at its place in the source.
     assert_eq!(model.geometry().extras, splats.geometry.extras);
     let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
     let moved = model.geometry().positions.iter().zip(&splats.geometry.positions).filter(|&p| far(p));

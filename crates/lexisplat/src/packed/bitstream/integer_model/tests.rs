@@ -1,11 +1,11 @@
-//! Integers against i64 and f64.
+//! Tests of the integers against i64 and f64.
 
 use proptest::prelude::*;
 
 use super::*;
 use crate::support::rng::SplitMix64;
 
-/// Integers as heads may hold them, wild ones too.
+/// Integers as a head may hold them, also unusual ones.
 fn integers() -> impl Strategy<Value = Integers> {
     let number = || prop_oneof![any::<i16>(), Just(i16::MIN), Just(i16::MAX), -4096_i16..4096];
     let step = (any::<u16>(), Step::SHIFTS).prop_map(|(mantissa, shift)| Step { mantissa, shift });
@@ -17,7 +17,7 @@ fn integers() -> impl Strategy<Value = Integers> {
     })
 }
 
-/// Features of three scales or more.
+/// Features of `N` scales or other values.
 fn features<const N: usize>() -> impl Strategy<Value = [i32; N]> {
     let one = prop_oneof![-MOST_FEATURE..=MOST_FEATURE, Just(-MOST_FEATURE), Just(MOST_FEATURE), -3000..3000];
     prop::collection::vec(one, N).prop_map(|v| std::array::from_fn(|k| v[k]))
@@ -27,13 +27,13 @@ fn lanes<const N: usize>(values: [i32; N]) -> [Lanes; N] {
     values.map(|v| [v; LANES])
 }
 
-/// The sum of slopes in 2^-9 octaves, by f64.
+/// Returns the logarithm of a step in 2^-9 octaves, by f64.
 fn logarithm(row: [i16; SLOPES], class: u32, scales: [i32; 3]) -> f64 {
     let slope = |k: usize| f64::from(row[k + 1]) / 4096.0 * f64::from(scales[k]);
     f64::from(row[0]) + 512.0 * f64::from(class) + slope(0) + slope(1) + slope(2)
 }
 
-/// Bits for a number of values, whose binary logarithm is given in 512ths, by f64.
+/// Returns the number of bits for a number of values by f64. `log` is its binary logarithm in 512ths.
 fn bits(log: f64) -> f64 {
     ((log + 255.0) / 512.0).floor().clamp(0.0, 15.0)
 }
@@ -41,7 +41,7 @@ fn bits(log: f64) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
-    /// A step is the nearest of 16 bits, rounded down to a unit, and doubles from class to class.
+    /// A step is the nearest one of 16 bits, rounded down to a unit. It doubles from class to class.
     #[test]
     fn steps_are_nearest(mantissa in 1.0..2.0_f64, exponent in -30..2_i32, class in 0_u32..16) {
         let x = libm::ldexp(mantissa, exponent);
@@ -75,7 +75,7 @@ proptest! {
         prop_assert!(value.abs() >= 256.0 || (value - exact).abs() <= 6.0 / 131_072.0);
     }
 
-    /// Logarithms are rounded down three times, so bits may be one fewer or more where a logarithm is at a limit.
+    /// Logarithms are rounded down three times, so a number of bits may be off by one where a logarithm is at a limit.
     #[test]
     fn bits_of_axes(p in integers(), class in 0_u32..16, mut scales in features::<3>()) {
         scales.sort_unstable_by(|a, b| b.cmp(a));
@@ -83,14 +83,14 @@ proptest! {
         prop_assert_eq!(needle[3], scales[0] - scales[1] >= scales[1] - scales[2]);
         let log = |k: usize| logarithm(p.turns[k], class, scales).min(512.0 * libm::log2(1.2));
         let (turn, other) = if needle[3] { (0, 2) } else { (2, 0) };
-        // A coordinate of an axis has 2.5 values a radian, a turn pi.
+        // A coordinate of an axis has 2.5 values a radian, and a turn has a range of pi.
         for over in [-4.0, 0.0, 4.0] {
             let pair = 0.5 * (log(1) + log(other));
             let near = bits(512.0 * libm::log2(2.5) - pair + over) - f64::from(found[0][3]);
             let nearer = bits(512.0 * libm::log2(std::f64::consts::PI) - log(turn) + over) - f64::from(found[1][3]);
             prop_assert!(near * over >= 0.0 && nearer * over >= 0.0 && near.abs() <= 1.0 && nearer.abs() <= 1.0);
         }
-        // Every Gaussian takes some bits of its rotation.
+        // Every Gaussian takes some bits for its rotation.
         prop_assert!(found.iter().all(|bits| (1..=15).contains(&bits[3])));
     }
 
@@ -99,10 +99,10 @@ proptest! {
         let steering = Steering::new(&p);
         let found = steering.move_logs(&[class; LANES], &lanes(scales));
         for k in 0..3 {
-            // Two standard deviations along the longest axis.
+            // The largest step is two standard deviations along the longest axis.
             let most = 512.0 + f64::from(scales[0]) / std::f64::consts::LN_2;
             let expected = logarithm(p.moves[k], class, scales).min(most);
-            // 739 is 512 / ln 2 but for 0.05 %.
+            // 739 is 512 / ln 2, within 0.05 %.
             let error = 4.0 + 5e-4 * f64::from(scales[0]).abs();
             prop_assert!((f64::from(found[k][1]) - expected).abs() <= error, "{expected} {found:?}");
             let over = f64::from(p.cell) - f64::from(found[k][1]);
@@ -145,7 +145,7 @@ fn integers_are_nearest_to_parameters() {
     near(found.means[4], 512.0, 2, 0.3 / unit);
     near(found.predictors[0][0], 512.0, 2, -1.0);
     near(found.predictors[0][1], 4096.0, 4, 0.9);
-    // Base colours are in units of 4; their own average is too.
+    // Base colours are in units of 4, and so is their average among the features.
     near(found.predictors[5][0], 512.0, 2, 0.5 / unit);
     near(found.predictors[5][1], 4096.0, 4, 0.9);
     near(found.predictors[5][4], 4096.0, 4, 0.2 / unit);
@@ -174,7 +174,7 @@ fn integers_come_back_in_one_form() {
         assert!(from.exhausted());
         assert_eq!(read, integers);
     }
-    // A width that no number of the group needs, and one that is too large.
+    // A width that is larger than the numbers of the group need, and one that is too large.
     for first in [1, 31] {
         let mut bytes = vec![0; 200];
         bytes[0] = first;

@@ -1,4 +1,4 @@
-//! Codes and exact rows come back, odd ones too.
+//! Codes and exact rows come back, also unusual ones.
 
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::packed::entropy::rans_encoder::SymbolRecorder;
 use crate::packed::entropy::script::tables_of;
 use crate::packed::entropy::tables::{Lookup, Tables};
 
-/// The Gaussians of each lane, none more than the first lane has.
+/// The Gaussians of each lane. No lane has more than the first.
 type Scene = Lanes<Vec<CodedGaussian>>;
 
 fn forms() -> impl Strategy<Value = RestForm> {
@@ -21,7 +21,7 @@ fn forms() -> impl Strategy<Value = RestForm> {
     })
 }
 
-/// Codes of up to `dim` nonzeros, some exact rows.
+/// A target with a code of up to `dim` nonzeros, or with an exact row.
 fn target(form: &RestForm) -> impl Strategy<Value = CodedGaussian> + use<> {
     let size = prop_oneof![6 => 1..20_u32, 1 => 1..MAX_SIZE, 1 => Just(MAX_SIZE - 1)];
     let value = (size, any::<bool>())
@@ -51,15 +51,15 @@ fn scenes() -> impl Strategy<Value = (RestForm, Scene)> {
     })
 }
 
-/// The lanes that have Gaussian `i`.
+/// Returns the set of lanes that have Gaussian `i`.
 fn set(scene: &Scene, i: usize) -> u32 {
     scene.iter().enumerate().fold(0, |set, (l, lane)| set | u32::from(i < lane.len()) << l)
 }
 
-/// Gaussians of a block. More than one block is coded.
+/// Number of Gaussians of a block in these tests, which is small so that several blocks are coded.
 const FEW: usize = 4;
 
-/// Codes the scene, block after block, or decodes as many Gaussians and hands each to `see`.
+/// Codes the scene block by block, or decodes as many Gaussians and hands each of them to `see`.
 fn code<S: Symbols>(
     parts: &mut [S],
     form: &RestForm,
@@ -86,7 +86,7 @@ fn code<S: Symbols>(
     Some(())
 }
 
-/// The ranges of all parts, and their tables.
+/// Returns the ranges of all parts, and their tables.
 fn recorded(form: &RestForm, scene: &Scene) -> (Vec<Vec<u8>>, Tables) {
     let mut parts = vec![SymbolRecorder::default(); form.least.len()];
     code(&mut parts, form, scene, true, |_, _| ()).unwrap();
@@ -105,7 +105,7 @@ proptest! {
     fn codes_and_rows_come_back((form, scene) in scenes()) {
         let (ranges, tables) = recorded(&form, &scene);
         let lookup = Lookup::new(&tables);
-        // Parts that are not there say nothing, and change nothing of those before them.
+        // A part that is missing has no nonzeros, and changes nothing in the parts before it.
         for there in 1..=form.least.len() {
             let player = |k: usize| SymbolDecoder::new(&lookup, &ranges[k], LANES, false).unwrap();
             let mut players: Vec<SymbolDecoder<'_>> = (0..there).map(player).collect();
@@ -143,7 +143,7 @@ proptest! {
         }
     }
 
-    /// A decoder with fewer atoms, or shorter rows, refuses what it cannot have.
+    /// A decoder with fewer atoms or shorter rows refuses codes that it cannot have.
     #[test]
     fn what_cannot_be_is_refused((form, scene) in scenes()) {
         let atoms = scene.iter().flatten().flat_map(|t| &t.code).map(|c| usize::from(c.0)).max();

@@ -1,4 +1,4 @@
-//! Values against those of f64 mathematics.
+//! Tests of values against f64.
 
 #![expect(clippy::cast_possible_truncation, reason = "test values fit")]
 
@@ -9,7 +9,7 @@ use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::encode::canonical::Canonical;
 
-/// Product of two quaternions w, x, y, z.
+/// Rotates the vector `v` by the quaternion w, x, y, z.
 fn turned([w, x, y, z]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let rows = [
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
@@ -23,7 +23,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The axes and the quaternion of one lane.
+/// Returns the axes and the quaternion of lane `l`.
 fn lane(out: &Turned, l: usize) -> ([[f64; 3]; 3], [f64; 4]) {
     let axes = out.axes.map(|axis| axis.map(|x| f64::from(x[l])));
     (axes, out.quaternions.map(|q| f64::from(q[l])))
@@ -45,7 +45,7 @@ proptest! {
     #[test]
     fn logarithms_are_those_of_libm(mantissa in 1.0..2.0_f64, exponent in -60..1_i32) {
         let x = libm::ldexp(mantissa, exponent);
-        // The first term that is left out is 2 / 17 of 0.1716^17. A few roundings of the sum add to it.
+        // The first term that is left out is 2 / 17 of 0.1716^17. A few roundings of the sum add to the error.
         let expected = libm::log(x);
         prop_assert!((ln(x) - expected).abs() <= 1.2e-14 + 4.0 * f64::EPSILON * expected.abs(), "{x}");
     }
@@ -54,7 +54,7 @@ proptest! {
     fn logits_are_those_of_libm(log in -(1 << 26)..=-105_i32) {
         let x = f64::from(log) / 1_048_576.0;
         let expected = x - libm::log(-libm::expm1(x));
-        // An error of 2^-31 of an opacity near 1 is up to 5e-6 of what it lacks.
+        // Near an opacity of 1, an error of 2^-31 is up to 5e-6 of the difference of the opacity from 1.
         prop_assert!((f64::from(logits(&[log; LANES])[5]) - expected).abs() <= 1e-5 + 1e-7 * expected.abs());
     }
 
@@ -88,18 +88,18 @@ proptest! {
             for k in 0..3 {
                 prop_assert!((dot(axes[j], axes[k]) - f64::from(u8::from(j == k))).abs() < 2e-6);
             }
-            // The quaternion turns the axes of the world to these.
+            // The quaternion turns the axes of the world to the axes of the Gaussian.
             let axis = turned(q, std::array::from_fn(|k| f64::from(u8::from(j == k))));
             prop_assert!((0..3).all(|k| (axis[k] - axes[j][k]).abs() < 4e-6), "{axis:?} {axes:?}");
         }
-        // The main axis is that of the middle of its square, by f64.
+        // The main axis is that of the middle of its cell of the square, by f64.
         let middle = |k: usize| 2.0 * (f64::from(codes[k]) + 0.5) / libm::exp2(bits[0].into()) - 1.0;
         let (x, y) = (0.5 * (middle(0) + middle(1)), 0.5 * (middle(0) - middle(1)));
         let z = 1.0 - x.abs() - y.abs();
         let length = (x * x + y * y + z * z).sqrt();
         let main = axes[if needle { 0 } else { 2 }];
         prop_assert!((dot(main, [x / length, y / length, z / length]) - 1.0).abs() < 1e-6);
-        // The turn is that of the code about the main axis, from where the shortest turn from z takes x.
+        // The turn about the main axis is that of the code. It is counted from where the shortest turn from z takes x.
         let [first, second] = across(main.map(|v| v as f32)).map(|axis| axis.map(f64::from));
         let other = axes[if needle { 1 } else { 0 }];
         let angle = libm::atan2(dot(other, second), dot(other, first));
@@ -107,7 +107,7 @@ proptest! {
         prop_assert!((angle - wanted).abs() < 1e-5, "{angle} {wanted}");
     }
 
-    /// Axes come back within the steps of their codes, but for their signs.
+    /// Axes come back within the steps of their codes, except for their signs.
     #[test]
     fn codes_of_axes_come_back(
         q in prop::array::uniform4(-1.0..1.0_f32),
@@ -126,7 +126,7 @@ proptest! {
         let out = rotations(&codes.map(|c| [c; LANES]), &bits.map(|b| [b; LANES]), &[needle; LANES]);
         let (found, _) = lane(&out, 0);
         let main = if needle { 0 } else { 2 };
-        // A step of the square is at most about two steps of the angle; half of it along each coordinate.
+        // A step of the square is at most about two steps of the angle. The error along each coordinate is half of that.
         let step = 2.0 * libm::exp2(-f64::from(bits[0])) * 2.0;
         let turn = std::f64::consts::PI * libm::exp2(-f64::from(bits[1]));
         for k in 0..3 {

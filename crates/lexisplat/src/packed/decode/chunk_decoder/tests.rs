@@ -1,4 +1,4 @@
-//! Chunks of which ranges are missing, and checksums of integers.
+//! Chunks with missing ranges, and checksums of integers.
 
 use super::*;
 use crate::packed::bitstream::LayerForm;
@@ -7,7 +7,7 @@ use crate::packed::{PackOptions, Packed, Packer};
 use crate::scene::splats::Geometry;
 use crate::{Sensitivity, Silent};
 
-/// A scene of two layers whose every 100th row is this one.
+/// Returns a packed scene of two layers. With `row`, every 100th SH-rest row has this value in all of its coefficients.
 fn packed(row: Option<f32>, viewpoints: Vec<[f32; 3]>) -> Packed {
     let mut splats = crate::support::testing::scene(9000, 11);
     let dim = splats.degree.rest();
@@ -32,7 +32,7 @@ struct Decoded {
     sums: Vec<u32>,
 }
 
-/// Decodes chunk `c` of the ranges that `there` says.
+/// Decodes chunk `c` from the ranges for which `there` is true.
 fn decoded(
     of: &BitstreamDecoder,
     packed: &Packed,
@@ -52,7 +52,7 @@ fn decoded(
     Some(Decoded { geometry, counts, piece, sums })
 }
 
-/// Root of the mean squared distance.
+/// Returns the root of the mean squared distance between two lists of vectors.
 fn distance<const N: usize>(a: &[[f32; N]], b: &[[f32; N]]) -> f64 {
     let squares = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(a - b).powi(2));
     (squares.sum::<f64>() / a.len() as f64).sqrt()
@@ -86,12 +86,12 @@ fn chunks_are_decoded_from_the_ranges_that_are_there() {
             for rest in 0..=parts {
                 let found = with(finer, rest);
                 assert_finite(&found);
-                // Scales and opacities are whole in the base.
+                // Scales and opacities are in the base in full.
                 assert_eq!(
                     (&found.geometry.scales, &found.geometry.opacities),
                     (&all.geometry.scales, &all.geometry.opacities)
                 );
-                // Nonzeros change nothing of the geometry.
+                // Nonzeros change nothing in the geometry.
                 let none = none.get_or_insert_with(|| found.geometry.clone());
                 assert_eq!(found.geometry, *none);
                 let nonzeros: usize = found.counts.iter().map(|&count| usize::from(count)).sum();
@@ -102,7 +102,7 @@ fn chunks_are_decoded_from_the_ranges_that_are_there() {
                 );
                 assert_eq!(found.piece.escapes.gaussians.is_empty(), rest == 0);
                 before = nonzeros;
-                // The integers of a range do not depend on later ones.
+                // The integers of a range do not depend on later ranges.
                 for (k, range) in chunk.ranges.iter().enumerate() {
                     if k <= finer || (1 + levels..1 + levels + rest).contains(&k) {
                         assert_eq!(found.sums[k], range.integers, "range {k} of chunk {c}");
@@ -129,13 +129,13 @@ fn ranges_after_one_that_is_missing_are_not_looked_at() {
         assert_eq!((a.geometry, a.counts, a.piece.atoms), (b.geometry, b.counts, b.piece.atoms));
         assert_eq!(a.piece.escapes, b.piece.escapes);
     };
-    // A base, two levels, and three parts.
+    // The chunk has a base, two refinements and three parts of SH-rest.
     same(&|k| k == 0 || k == 2, &|k| k == 0);
     same(&|k| k != 4, &|k| k <= 3);
     same(&|k| [0, 4, 5].contains(&k), &|k| k == 0);
 }
 
-/// Without codes base colours are what points see on average, and with them the colours of the source.
+/// Without codes, base colours are the average over the points of view. With codes, they are the colours of the source.
 #[test]
 fn base_colours_are_seen_on_average() {
     let plain = packed(None, Vec::new());

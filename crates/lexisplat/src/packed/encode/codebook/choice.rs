@@ -1,4 +1,4 @@
-//! How many atoms a small scene learns, and how finely they are rounded.
+//! Choice of the number of atoms that a small scene learns, and of their precision.
 
 use super::costs::Costs;
 use super::{Codebook, PRICE, StopRule, first_atoms, learn};
@@ -8,29 +8,30 @@ use crate::sparse::learn::unit_axis;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 
-/// Learned atoms that are tried, as one of so many parts of those that a scene pays for.
+/// Divisors of the number of atoms that a scene justifies. Each quotient is tried as the number of learned atoms.
 const PARTS: [usize; 3] = [4, 2, 1];
-/// Steps of values that are tried, as shares of the usual one. With few atoms errors are larger at the same step.
+/// Steps of values that are tried, as shares of the usual step. With few atoms, errors are larger at the same step.
 const STEPS: [f32; 5] = [1.0, 0.9, 0.8, 0.7, 0.6];
-/// Price of an error above that of the reference, as a multiple of the usual price. The reference is a dictionary with as many
-/// learned atoms as coefficients. An error below that of the reference earns nothing, so that pictures stay as good.
+/// Price of an error above that of the reference, as a multiple of the usual price of an error. The reference is the first
+/// dictionary that is tried, with at least as many learned atoms as coefficients. An error below that of the reference
+/// earns nothing, so that pictures stay as good.
 const EXCESS: f64 = 2.0;
 /// Most bits by which atoms are rounded more coarsely than usual.
 const FEWER_BITS: u32 = 3;
-/// Least bits of atoms.
+/// Least bits to which atoms are rounded.
 const LEAST_BITS: u32 = 2;
 
-/// A dictionary with its costs.
+/// A dictionary with its costs and its step of values.
 pub(in crate::packed) struct Choice {
     pub(in crate::packed) atoms: WholeAtoms,
     pub(in crate::packed) costs: Costs,
-    /// The step of values, as a share of the usual one.
+    /// The step of values, as a share of the usual step.
     pub(in crate::packed) step: f32,
 }
 
-/// The dictionary with which `rows` and the dictionary take the fewest bits at about the error that as many learned atoms
-/// as `pays` or as there are coefficients have. `bits_of` says how finely atoms are rounded as a rule, from
-/// rows, atoms and costs.
+/// Returns the dictionary with the least cost: the bits of the codes of `rows` and of the dictionary itself, plus a price
+/// for an error above that of the reference. The reference has `max(pays, coefficients)` learned atoms.
+/// `bits_of(rows, atoms, costs)` returns the usual number of bits to which atoms are rounded.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels.

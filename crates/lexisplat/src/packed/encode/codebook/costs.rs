@@ -1,28 +1,28 @@
-//! What symbols cost in bits, estimated from how often codes used them.
+//! Costs of symbols in bits, estimated from how often codes used them.
 
 use serde::{Deserialize, Serialize};
 
 use super::{COUNT_CLASSES, Codes};
 use crate::support::maths;
 
-/// Values with a cost of their own, by size. The costs of larger ones are extrapolated.
+/// Number of value sizes with a cost of their own. The costs of larger values are extrapolated.
 const VALUE_COSTS: usize = 64;
-/// Added to every count before a cost is computed, so that symbols that were not used have a finite cost.
+/// Added to every count before a cost is computed, so that symbols that were never used have a finite cost.
 const SMOOTHING: f64 = 0.25;
 
-/// What symbols cost, in bits.
+/// Costs of symbols, in bits.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Costs {
     /// Cost of an atom, by its number.
     pub(super) atoms: Vec<f32>,
     /// Cost of a value with its sign, by its size minus 1.
     pub(super) values: Vec<f32>,
-    /// Cost of a number of nonzeros, by colour class and number.
+    /// Cost of a number of nonzeros, by colour class and then by number.
     pub(super) counts: Vec<Vec<f32>>,
 }
 
 impl Costs {
-    /// Costs before any code is known.
+    /// Returns costs to start with, for `atoms` atoms and rows of `dim` coefficients.
     pub(in crate::packed) fn initial(atoms: usize, dim: usize) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let bits = |x: f64| x as f32;
@@ -35,7 +35,7 @@ impl Costs {
         }
     }
 
-    /// Costs by `usage`. A class that was not used keeps its costs in `previous`.
+    /// Computes costs from `usage`. A colour class that was not used keeps its costs of `previous`.
     pub(super) fn of(usage: &Usage, previous: &Self) -> Self {
         let bits = |counts: &[f64]| -> Vec<f32> {
             let total: f64 = counts.iter().map(|c| c + SMOOTHING).sum();
@@ -53,7 +53,7 @@ impl Costs {
         Self { atoms: bits(&usage.atoms), values, counts: counts.collect() }
     }
 
-    /// The cost of a value of this size, at least 1.
+    /// Returns the cost of a value with its sign. `size` is its magnitude, at least 1.
     pub(super) fn value(&self, size: f32) -> f32 {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1")]
         let index = (size as usize).saturating_sub(1);
@@ -63,13 +63,13 @@ impl Costs {
         }
     }
 
-    /// The costs of numbers of nonzeros in a colour class.
+    /// Returns the cost of each number of nonzeros in a colour class.
     pub(super) fn counts(&self, class: u8) -> &[f32] {
         &self.counts[usize::from(class).min(COUNT_CLASSES - 1)]
     }
 }
 
-/// How often codes used each symbol.
+/// Counts of how often codes used each symbol.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Usage {
     pub(super) atoms: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Learns a dictionary for codes of least cost: codes the rows, refits the atoms to their users, repeats.
+//! Learns a dictionary for codes of least cost: codes the rows, refits each atom to the rows that use it, and repeats.
 
 use super::costs::{Costs, Usage};
 use super::{Codebook, StopRule};
@@ -8,16 +8,17 @@ use crate::support::progress::{Progress, Stage};
 
 /// Rounds of coding and refitting.
 const ROUNDS: usize = 14;
-/// An atom with fewer users is replaced. The exact codec replaces atoms with fewer than 4 users, and the less used of
-/// two similar atoms. Files depend on both rules.
+/// Least number of users of an atom. An atom with fewer is replaced. The exact codec replaces atoms with fewer than 4
+/// users, and the less used of two similar atoms. Files depend on both rules.
 const MIN_USERS: f64 = 3.0;
-/// In this many last rounds no atoms are replaced.
+/// Number of last rounds in which no atoms are replaced.
 const SETTLING: usize = 4;
 /// Shortest sum that gives an atom a new direction.
 const MIN_NORM: f64 = 0.0;
 
-/// Learns unit-norm atoms from `rows`, beginning with the atoms `first`, of which the last `fixed` stay as they are. Returns
-/// the others most used first, without unused ones, and then the fixed ones, and the costs at which all were used.
+/// Learns unit-norm atoms from `rows`, starting with the atoms `first`. The last `fixed` of these stay as they are. Returns
+/// the learned atoms, most used first and without unused ones, followed by the fixed ones. Returns also the costs of
+/// symbols.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels.
@@ -67,8 +68,8 @@ pub(crate) fn learn(
     Ok(most_used_first(dim, &book.rows, learned, &usage, &book.costs))
 }
 
-/// The first `learned` of `atoms` most used first, without unused ones, and then the others; and the costs at this `usage`.
-/// `before` are those at which they were used.
+/// Sorts the first `learned` of `atoms` by use, most used first, and drops unused ones. The other atoms follow. Returns the
+/// atoms and the costs for this `usage`. `before` are the costs with which the codes were found.
 fn most_used_first(
     dim: usize,
     atoms: &[f32],
@@ -88,10 +89,10 @@ fn most_used_first(
     (kept, Costs { atoms: of_kept, ..costs })
 }
 
-/// Moves `atom` to the unit vector that leaves the least error with the values of `users` as they are.
+/// Moves `atom` to the unit vector with the least error if the values of `users` stay as they are. Updates the residuals.
 ///
 /// The exact codec's `refit` sums residuals in f32 in groups of 64 users before it goes on in f64, and then refits the
-/// values too. Here all sums are f64 and the values, which are integers, stay. Files depend on both, so only the new
+/// values too. Here all sums are f64, and the values, which are integers, stay. Files depend on both, so only the new
 /// direction is computed by shared code.
 fn refit(users: &[(u32, f32)], atom: &mut [f32], residuals: &mut [f32]) {
     let dim = atom.len();
@@ -134,15 +135,15 @@ fn replace_unused(dim: usize, users: &[f64], atoms: &mut [f32], residuals: &[f32
     }
 }
 
-/// Returns `atoms` atoms to start learning from: principal axes, then directions of `rows`, then coordinate axes.
+/// Returns `atoms` atoms to start with: principal axes, then directions of `rows`, then coordinate axes.
 ///
 /// The exact codec draws dissimilar vectors at random and normalises in f64. Here `rows` are in random order already,
-/// similar ones are not skipped, and norms are f32. Files depend on both, so only the axes are shared.
+/// similar rows are not skipped, and norms are f32. Files depend on both, so only the principal axes are shared.
 pub(crate) fn first_atoms(dim: usize, atoms: usize, rows: &[f32]) -> Vec<f32> {
     first_atoms_of(dim, atoms, &principal_axes(dim, rows), rows)
 }
 
-/// [`first_atoms`] from principal axes and some rows.
+/// Returns [`first_atoms`], given the principal axes of `rows`.
 fn first_atoms_of(dim: usize, atoms: usize, axes: &[Vec<f64>], rows: &[f32]) -> Vec<f32> {
     let mut out = Vec::with_capacity(atoms * dim);
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]

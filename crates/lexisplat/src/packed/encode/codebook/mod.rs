@@ -1,12 +1,12 @@
-//! Codes that weigh bits against error, and a dictionary learned for the same cost.
+//! Sparse codes that trade rate for distortion, and the dictionary that is learned for the same cost.
 //!
-//! Rows are SH-rest in units of value steps, so that values are integers and every Gaussian's error counts the same. A
-//! code minimises `|y - D v|^2 + PRICE * bits(v)` over integer values v, greedily.
+//! A row is the SH-rest of a Gaussian in units of its value step. So values are integers, and the error of every Gaussian
+//! counts the same. A code of the row `y` minimises `|y - D v|^2 + PRICE * bits(v)` over integer values `v`, greedily.
 //!
-//! This pursuit shares its lanes and its inner loops with that of the exact codec (`sparse::pursuit`). Its steps differ
-//! for two reasons. The exact codec refits all values by least squares after every step, while values here are integers
-//! that are corrected one by one. The exact codec compares atoms by the error they remove, while this one also
-//! subtracts what they cost in bits.
+//! This pursuit shares its lanes and its inner loops with that of the exact codec (`sparse::pursuit`). Its steps differ for
+//! two reasons. The exact codec refits all values by least squares after every step, while values here are integers that
+//! are corrected one by one. The exact codec compares atoms by the error that they remove, while this one also subtracts
+//! their cost in bits.
 
 mod choice;
 mod costs;
@@ -27,15 +27,15 @@ pub(in crate::packed) use learn::{first_atoms, learn};
 pub(in crate::packed) const PRICE: f32 = 0.16;
 /// Largest value, in steps. Rounding a residual never needs more.
 const MAX_VALUE: f32 = 1e6;
-/// Most atoms taken for each value of a row, counting repeats. A row can be so long that subtracting an atom does not
-/// change it in f32; without this limit the loop would not end.
+/// Most atoms that are taken for each coefficient of a row, counting repeats. A row can be so long that subtracting an atom
+/// does not change it in f32. Without this limit the loop would not end.
 const TAKES_PER_VALUE: usize = 8;
-/// Colour classes that numbers of nonzeros are told apart by in their cost.
+/// Number of colour classes with costs of their own for the number of nonzeros. Higher classes share those of the last one.
 const COUNT_CLASSES: usize = 12;
-/// The codes of many rows, one after the other.
+/// The codes of many rows, one after the other. A code is a list of pairs `(atom, value)`.
 #[derive(Debug, Default, Clone)]
 pub(in crate::packed) struct Codes {
-    /// Where each row's code ends.
+    /// The end of each row's code in `pairs`.
     ends: Vec<usize>,
     pairs: Vec<(u16, i32)>,
 }
@@ -58,16 +58,16 @@ impl Codes {
     }
 }
 
-/// A dictionary prepared for coding.
+/// A dictionary with its costs, prepared for coding.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Codebook {
     dim: usize,
     blocks: usize,
-    /// The atoms, one after the other.
+    /// The atoms, one after the other, of `dim` coefficients each.
     rows: Vec<f32>,
-    /// `dim` rows of `blocks` lanes: entry (d, j) is coefficient d of atom j.
+    /// `dim` rows of `blocks` lanes: entry `(d, j)` is coefficient `d` of atom `j`.
     transposed: Vec<Lane>,
-    /// `atoms` rows of `blocks` lanes: inner products of atoms.
+    /// `atoms` rows of `blocks` lanes: entry `(i, j)` is the inner product of atoms `i` and `j`.
     gram: Vec<Lane>,
     pub(in crate::packed) costs: Costs,
 }
@@ -79,12 +79,12 @@ struct Scratch {
     code: Vec<(u16, f32)>,
 }
 
-/// When a code is good enough to end its pursuit.
+/// The rule by which the pursuit of a code stops.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(in crate::packed) enum StopRule {
-    /// One more atom would cost more bits than its gain is worth.
+    /// Stops when one more atom would cost more bits than its gain is worth.
     Balanced,
-    /// The squared error, in squared steps, is at most this.
+    /// Stops when the squared error, in squared steps, is at most this.
     Error(f32),
 }
 
@@ -104,7 +104,7 @@ impl Codebook {
         &self.rows[j * self.dim..(j + 1) * self.dim]
     }
 
-    /// Codes of all rows; `classes` has one entry a row.
+    /// Returns the codes of all rows. `classes` has one colour class a row.
     pub(in crate::packed) fn encode(&self, rows: &[f32], classes: &[u8], stop: StopRule) -> Codes {
         let parts = map_chunks(classes.len(), GAUSSIANS_PER_TASK, |range| {
             let mut codes = Codes::default();
@@ -124,12 +124,12 @@ impl Codebook {
         all
     }
 
-    /// Whether the codes of all rows are empty.
+    /// Returns whether the codes of all rows are empty.
     fn uses_nothing(&self, rows: &[f32], classes: &[u8]) -> bool {
         self.encode(rows, classes, StopRule::Balanced).pairs.is_empty()
     }
 
-    /// The squared errors of the codes of all rows, and their bits.
+    /// Returns the sum of the squared errors of the codes of all rows, and the sum of their bits.
     fn rate_and_distortion(&self, rows: &[f32], classes: &[u8]) -> (f64, f64) {
         let codes = self.encode(rows, classes, StopRule::Balanced);
         let (mut error, mut bits) = (0.0, 0.0);
@@ -167,7 +167,7 @@ impl Codebook {
             StopRule::Balanced => 0.0,
             StopRule::Error(most) => most,
         };
-        // A code cannot gain more than the whole error.
+        // A code cannot gain more than the whole error, so a smaller error needs no search.
         let cheapest = PRICE * (counts[1] - counts[0]).max(0.0);
         if energy <= goal || (stop == StopRule::Balanced && energy <= cheapest) || !energy.is_finite() {
             return;
@@ -205,7 +205,7 @@ impl Codebook {
         out.sort_by_key(|&(atom, value)| (std::cmp::Reverse(value.unsigned_abs()), atom));
     }
 
-    /// Moves `value` of atom `j` from the residual into the code.
+    /// Adds `value` of atom `j` to the code, and updates the correlations with the residual.
     #[inline(always)]
     fn take(&self, s: &mut Scratch, j: usize, value: f32) {
         let gram = &self.gram[j * self.blocks..(j + 1) * self.blocks];
@@ -214,7 +214,7 @@ impl Codebook {
         }
     }
 
-    /// Rounds every value anew, since later atoms changed the residual. Returns by how much the squared error fell.
+    /// Rounds every value again, since later atoms changed the residual. Returns the decrease of the squared error.
     #[inline(always)]
     fn refine(&self, s: &mut Scratch) -> f32 {
         let mut gained = 0.0;
@@ -259,7 +259,7 @@ fn best(correlations: &[Lane], prices: &[Lane]) -> Option<usize> {
     for (number, (c, p)) in (0_u32..).zip(correlations.iter().zip(prices)) {
         for i in 0..LANES {
             let worth = c.0[i] * c.0[i] - p.0[i];
-            // A mask, as in the exact codec's pursuit.
+            // A mask instead of a branch, as in the exact codec's pursuit.
             let better = if worth > most[i] { u32::MAX } else { 0 };
             most[i] = f32::from_bits((worth.to_bits() & better) | (most[i].to_bits() & !better));
             block[i] = (number & better) | (block[i] & !better);

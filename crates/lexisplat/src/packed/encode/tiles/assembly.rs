@@ -1,4 +1,4 @@
-//! Makes a file of coded buckets.
+//! Assembly of a file from coded buckets.
 
 use std::path::Path;
 
@@ -15,21 +15,21 @@ use crate::support::progress::Progress;
 use crate::support::sink::Sink;
 use crate::support::spill::{Spill, SpillTo, Spilled};
 
-/// A file that is being made of coded buckets.
+/// A file under construction, to which coded buckets are added in order.
 #[derive(Debug)]
 pub struct Assembly<'a> {
     plan: &'a Plan,
     coding: &'a Coding,
     tables: &'a Tables,
-    /// Number of the file.
+    /// Number of the file among [`Plan::files`].
     file: usize,
-    /// The bucket that comes next.
+    /// Number of the bucket that [`Self::push`] expects.
     next: usize,
     ranges: Ranges,
     layers: Vec<Layer>,
 }
 
-/// What comes of one layer beside its ranges.
+/// The parts of a layer that are not in its ranges.
 #[derive(Debug)]
 struct Layer {
     gaussians: usize,
@@ -38,10 +38,10 @@ struct Layer {
 }
 
 impl<'a> Assembly<'a> {
-    /// Begins file `file` of [`Plan::files`]. Its buckets lie in temporary files in `folder` until it is written.
+    /// Begins file `file` of [`Plan::files`]. Until the file is written, its buckets are in temporary files in `folder`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there is no such file, [`Error::Io`] for temporary files.
+    /// [`Error::Parameter`] if there is no such file; [`Error::Io`] if temporary files cannot be made.
     pub fn new(
         plan: &'a Plan,
         coding: &'a Coding,
@@ -65,10 +65,10 @@ impl<'a> Assembly<'a> {
         Ok(Self { plan, coding, tables, file, next: own.start, ranges: Ranges::new(to)?, layers })
     }
 
-    /// Adds the next bucket.
+    /// Adds the next bucket of the file.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for another bucket than the next one and for one with other tables, [`Error::Io`].
+    /// [`Error::Parameter`] if `coded` is not the next bucket or has other tables than the file; [`Error::Io`].
     pub fn push(&mut self, coded: Coded) -> Result<()> {
         if coded.bucket != self.next {
             return Err(Error::parameter("coded bucket", coded.bucket, format!("{}, the next", self.next)));
@@ -86,11 +86,11 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    /// Writes the file to `sink`, when all buckets are there. `counts` are those of its buckets, in order. `device` is the GPU that looked at
-    /// them, if one did.
+    /// Writes the file to `sink`. All of its buckets must have been added. `counts` holds the counts of these buckets, in
+    /// order. `device` is the GPU that measured them, if one did.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if buckets are missing, [`Error::Io`], [`Error::Writer`] and [`Error::Cancelled`].
+    /// [`Error::Parameter`] if buckets are missing; [`Error::Io`], [`Error::Writer`] and [`Error::Cancelled`].
     pub fn finish<'s>(
         self,
         counts: &[Counts],
@@ -125,7 +125,7 @@ impl<'a> Assembly<'a> {
     }
 }
 
-/// The values of each column of all layers, from the columns of each layer.
+/// Regroups the columns of each layer by column: returns for each column its values in all layers.
 fn by_column(layers: Vec<(usize, Vec<(Extra, Spilled)>)>) -> Vec<(Extra, Vec<(usize, Spilled)>)> {
     let mut columns: Vec<(Extra, Vec<(usize, Spilled)>)> = Vec::new();
     for (count, layer) in layers {

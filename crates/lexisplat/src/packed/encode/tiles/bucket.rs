@@ -19,11 +19,11 @@ use crate::support::progress::Progress;
 pub struct Bucket {
     pub(super) number: usize,
     pub(super) splats: Splats,
-    /// Cell and number in the source of each.
+    /// The cell of each Gaussian, and its number in the source.
     pub(super) places: Vec<MortonKey>,
 }
 
-/// Collects the Gaussians of a bucket from blocks of tiles.
+/// A reader that collects the Gaussians of one bucket from blocks of tiles.
 #[derive(Debug)]
 pub struct BucketReader<'p> {
     plan: &'p Plan,
@@ -31,16 +31,16 @@ pub struct BucketReader<'p> {
 }
 
 impl<'p> BucketReader<'p> {
-    /// Collects those of bucket `number`.
+    /// Creates a reader for bucket `number`.
     #[must_use]
     pub fn new(plan: &'p Plan, number: usize) -> Self {
         Self { plan, bucket: Bucket { number, splats: plan.empty(), places: Vec::new() } }
     }
 
-    /// Takes those of `rows` of tile `number` that are of the bucket. Rows come in any order.
+    /// Adds the Gaussians of the bucket that are among `rows` of tile `number`. Rows may come in any order.
     ///
     /// # Errors
-    /// As [`Plan::runs`].
+    /// Those of [`Plan::runs`].
     pub fn add(
         &mut self,
         number: usize,
@@ -62,10 +62,10 @@ impl<'p> BucketReader<'p> {
         })
     }
 
-    /// Takes a piece that [`Plan::scatter`] made for the bucket.
+    /// Adds a piece that [`Plan::scatter`] made for the bucket.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for other bytes, and for pieces of other buckets and scenes.
+    /// [`Error::Parameter`] if `bytes` are not a piece of this bucket and this scene.
     pub fn add_piece(&mut self, bytes: &[u8]) -> Result<()> {
         let Piece { scene, bucket, places, rows } = Piece::from_bytes(bytes)?;
         self.plan.check("piece", [scene], None)?;
@@ -85,13 +85,13 @@ impl<'p> BucketReader<'p> {
         Ok(())
     }
 
-    /// Takes rows of the bucket, which are at these `places`.
+    /// Adds rows that all are of the bucket. `places` holds the key of each row.
     pub(crate) fn add_rows(&mut self, layout: &RowLayout, rows: &[u8], mut places: Vec<MortonKey>) {
         self.bucket.splats.append(layout.unpack(rows));
         self.bucket.places.append(&mut places);
     }
 
-    /// The bucket.
+    /// Returns the bucket, sorted along the Morton curve.
     #[must_use]
     pub fn finish(self) -> Bucket {
         let Bucket { number, mut splats, mut places } = self.bucket;
@@ -108,27 +108,29 @@ impl<'p> BucketReader<'p> {
 }
 
 impl Bucket {
-    /// The cell of each Gaussian, and its number in the bucket.
+    /// Returns the cell of each Gaussian, and its number in the bucket.
     pub(super) fn scene(&self) -> Vec<MortonKey> {
         (0..).zip(&self.places).map(|(source, place)| MortonKey { source, ..*place }).collect()
     }
 
-    /// Its number among all buckets.
+    /// Returns the number of the bucket among all buckets.
     #[must_use]
     pub fn number(&self) -> usize {
         self.number
     }
 
-    /// Its Gaussians.
+    /// Returns the Gaussians of the bucket.
     #[must_use]
     pub fn splats(&self) -> &Splats {
         &self.splats
     }
 
-    /// Sums up what was `observed` of the bucket's Gaussians. Without it, what shows is guessed from each Gaussian alone.
+    /// Sums up what was `observed` of the bucket's Gaussians. Without an observation, the sensitivity is guessed from each
+    /// Gaussian alone.
     ///
     /// # Errors
-    /// [`crate::Error::Parameter`] for a sensitivity of another length or with values that are not finite.
+    /// [`crate::Error::Parameter`] if the sensitivity has another length or values that are not finite, or if the step
+    /// factor is not a finite number above 0.
     pub fn look(&self, plan: &Plan, observed: Option<Observed>) -> Result<(LookStatistics, Looked)> {
         let (Observed { sensitivity, memo, .. }, scale) = match observed {
             None => {
@@ -138,7 +140,8 @@ impl Bucket {
             Some(mut observed) => {
                 observed.check()?;
                 let share = self.splats.len() as f64 / plan.len().max(1) as f64;
-                // All parts have one overall step. A part that asks for half of it weighs four times as much.
+                // All parts have one overall step. A part that asks for half of that step gets four times the weights
+                // instead.
                 #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
                 let scale = (share / observed.step_factor.powi(2)) as f32;
                 observed.sensitivity.scale(scale);

@@ -27,7 +27,7 @@ use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
 use crate::support::stopwatch::Stopwatch;
 
-/// Everything that buckets are coded with.
+/// The parameters, the dictionary and the costs with which all buckets are coded.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Coding {
     scene: u32,
@@ -35,9 +35,9 @@ pub struct Coding {
     floor: Floor,
     most_dc: f64,
     atoms: WholeAtoms,
-    /// What symbols cost.
+    /// The costs of symbols.
     costs: Costs,
-    /// The step of values, as a share of the usual one.
+    /// The step of values, as a share of the usual step.
     value_step: f32,
 }
 
@@ -46,29 +46,29 @@ pub struct Coding {
 pub struct Coded {
     scene: u32,
     pub(super) bucket: usize,
-    /// The tables it is coded with, its own ones.
+    /// The bytes of the tables with which the chunks are coded: the bucket's own, or those of all buckets.
     tables: Vec<u8>,
     chunks: Vec<Written>,
     pub(super) layers: Vec<CodedLayer>,
 }
 
-/// What chunks do not hold of one layer.
+/// The parts of a layer that are not in its chunks.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct CodedLayer {
     pub(super) gaussians: usize,
-    /// The place of each in the source of its file, if the order is kept.
+    /// The place of each Gaussian in the source of its file, if the order is kept.
     pub(super) order: Option<Vec<u32>>,
     pub(super) extras: Vec<Extra>,
 }
 
-/// How often each symbol occurs in a bucket.
+/// Counts of how often each symbol occurs in a bucket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Counts {
     scene: u32,
     pub(super) counts: encoding::Counts,
 }
 
-/// The tables that all buckets are coded with.
+/// The tables with which all buckets are coded.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Tables {
     scene: u32,
@@ -78,11 +78,11 @@ pub struct Tables {
 messages!(Coding => "coding", Coded => "coded bucket", Counts => "counts", Tables => "tables");
 
 impl Coding {
-    /// Everything that buckets are coded with. `groups` are the statistics of all, in order. Learns the dictionary, and reports it
-    /// to `progress`.
+    /// Learns the dictionary, and settles everything else with which buckets are coded. `groups` holds the statistics of
+    /// all groups, in order. Reports the learning to `progress`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if they are not those of all groups, and if values are so large that sums of them leave f32;
+    /// [`Error::Parameter`] if `groups` are not those of all groups, or if values are so large that sums of them leave f32;
     /// [`Error::Cancelled`].
     pub fn new(
         plan: &Plan,
@@ -105,13 +105,13 @@ impl Coding {
         Ok(Self { scene: plan.scene(), steps: steps.clone(), floor, most_dc, atoms, costs, value_step: step })
     }
 
-    /// Number of Gaussians that are coded.
+    /// Returns the number of Gaussians that are coded.
     #[must_use]
     pub fn kept(&self) -> usize {
         self.steps.kept()
     }
 
-    /// The encoder, before anything is coded.
+    /// Returns an encoder that has coded nothing.
     pub(super) fn encoding(&self, plan: &Plan) -> Result<Encoding> {
         plan.check("coding", [self.scene], None)?;
         let clock = Stopwatch::start();
@@ -131,11 +131,11 @@ impl Coding {
         Ok(Encoding::new((coder, self.atoms.clone()), layering, self.most_dc, clock))
     }
 
-    /// Codes the Gaussians of `bucket` that stay, with tables of its own. `refit` fits what they show, if that may change. Advances
-    /// `progress` by their number.
+    /// Codes the Gaussians of `bucket` that stay, with the bucket's own tables. `refit` fits their base colours and
+    /// opacities, if these may change. Advances `progress` by the number of Gaussians.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `looked` is of another bucket, and for values that no file holds; what `refit` returns;
+    /// [`Error::Parameter`] if `looked` is of another bucket, or if a file cannot hold a value; errors of `refit`;
     /// [`Error::Cancelled`].
     pub fn code<E: From<Error>>(
         &self,
@@ -184,10 +184,11 @@ impl Coding {
 }
 
 impl Tables {
-    /// The tables for all buckets. `counts` are those of all, in order.
+    /// Makes the tables for all buckets. `counts` holds the counts of all buckets, in order.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there are more symbols than a file holds.
+    /// [`Error::Parameter`] if there are no counts, if they are of several scenes, or if there are more symbols than a file
+    /// holds.
     pub fn new(counts: &[Counts]) -> Result<Self> {
         let wrong = || Error::parameter("counts", counts.len(), "those of all buckets of a scene");
         let all = Counts::sum(counts).ok_or_else(wrong)?;
@@ -201,7 +202,7 @@ impl Tables {
 }
 
 impl Counts {
-    /// The sum of all, one after the other; `None` if there are none, or of several scenes.
+    /// Returns the sum of all counts. `None` if there are none, or if they are of several scenes.
     pub(super) fn sum(all: &[Self]) -> Option<Self> {
         let (first, rest) = all.split_first()?;
         let mut sum = first.clone();
@@ -211,10 +212,10 @@ impl Counts {
 }
 
 impl Coded {
-    /// The same bucket, coded with the tables of all.
+    /// Recodes the bucket with the tables of all buckets.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if it is not of this coding.
+    /// [`Error::Parameter`] if the bucket is of another scene or another coding.
     pub fn with_tables(self, plan: &Plan, coding: &Coding, tables: &Tables) -> Result<Self> {
         plan.check("coded bucket", [self.scene], None)?;
         let wrong =
@@ -231,7 +232,7 @@ impl Coded {
         Ok(Self { tables: tables.bytes.clone(), chunks, ..self })
     }
 
-    /// Flips a bit of a range.
+    /// Flips a bit of one byte of the ranges; `at` selects the byte and the bit.
     #[cfg(test)]
     pub(super) fn damage(&mut self, at: usize) {
         let ranges =
@@ -241,7 +242,7 @@ impl Coded {
         *bytes[at % count] ^= 1 << (at % 8);
     }
 
-    /// Takes its chunks and layers out, if they are coded with `tables` and belong together.
+    /// Returns the chunks and the layers, if they are coded with `tables` and belong together.
     pub(super) fn into_chunks(
         self,
         plan: &Plan,
@@ -266,7 +267,7 @@ impl Coded {
         Ok((self.chunks, self.layers))
     }
 
-    /// The bucket's number.
+    /// Returns the number of the bucket.
     #[must_use]
     pub fn bucket(&self) -> usize {
         self.bucket

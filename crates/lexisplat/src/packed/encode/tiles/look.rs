@@ -1,4 +1,4 @@
-//! What a look at a bucket says of its Gaussians.
+//! The results of measuring a bucket: weights of its Gaussians, and sums over them.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,19 +12,19 @@ use crate::packed::encode::removal::{changes_without, is_worth_its_bits};
 use crate::scene::sensitivity::Sensitivity;
 use crate::support::error::{Error, Result};
 
-/// Sum of the squared weights that views measure. A guess scales its weights to a sum of 1, but squares sum
-/// to less where several Gaussians share a pixel or none covers it. Without this factor files came out 7 to 9 dB
-/// better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
+/// Sum of the squared weights that views measure. A guess scales its weights to a sum of 1, but the sum of squares is
+/// smaller where several Gaussians share a pixel or none covers it. Without this factor, files came out 7 to 9 dB better
+/// than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
 pub(crate) const SHOWN: f64 = 0.1;
 
-/// What is remembered of a bucket: of each Gaussian its weights, rounded to eighths of an octave, and whether it stays; by how much
-/// weights are larger than the observer's; and the observer's memo.
+/// The memory of a measured bucket. It holds the weights of each Gaussian, rounded to eighths of an octave, and whether the
+/// Gaussian stays. It also holds the factor from the observer's weights to these, and the observer's memo.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Looked {
     scene: u32,
     bucket: usize,
     pairs: Pairs,
-    /// One bit a Gaussian, the lowest first.
+    /// One bit for each Gaussian, the lowest first: whether it stays.
     stays: Vec<u8>,
     scale: f32,
     memo: Vec<u8>,
@@ -36,11 +36,11 @@ pub struct LookStatistics {
     pub(super) scene: u32,
     pub(super) bucket: usize,
     pub(super) gaussians: u64,
-    /// Number of those that stay.
+    /// Number of Gaussians that stay.
     pub(super) kept: u64,
-    /// Sensitivities to the colour and to the logarithm of the opacity.
+    /// Histograms of the sensitivities to the colour and to the logarithm of the opacity.
     pub(super) weights: [Histogram; 2],
-    /// Those to the opacity, of the Gaussians that stay.
+    /// Histogram of the sensitivities to the logarithm of the opacity, of the Gaussians that stay.
     pub(super) energies: Histogram,
     pub(super) colours: ColourMoments,
     pub(super) derivatives: Derivatives,
@@ -100,21 +100,22 @@ impl Looked {
         Self { scale, memo, ..self }
     }
 
-    /// The weights of an observer, from those that the scene has.
+    /// Returns the observer's own weights. `weights` are those that the scene has.
     pub(super) fn observed(&self, weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
         weights.iter().map(|own| own.map(|weight| weight / self.scale)).collect()
     }
 
-    /// The memo of [`Observed`](crate::stream::Observed).
+    /// Returns the memo of [`Observed`](crate::stream::Observed).
     #[must_use]
     pub fn memo(&self) -> &[u8] {
         &self.memo
     }
 
-    /// The weights of each Gaussian, and whether it stays. The first does in any case if `first_stays`.
+    /// Returns the weights of each Gaussian, and whether it stays. With `first_stays`, the first Gaussian stays in any
+    /// case.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if these are of another bucket.
+    /// [`Error::Parameter`] if `self` is of another bucket than `bucket`.
     pub(super) fn of_each(
         &self,
         plan: &Plan,

@@ -1,4 +1,4 @@
-//! How a scene of tiles is divided into buckets.
+//! The plan of a scene of tiles: its grid, and its division into buckets.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -22,40 +22,43 @@ use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::maths::Vec3;
 use crate::support::progress::Progress;
 
-/// Most groups of buckets whose samples are learned from. Every group sends a sum in every round, and rounds take a second in all.
+/// Most groups of buckets from whose samples the dictionary is learned.
 const GROUPS: usize = 2;
-/// Most buckets that are sampled, evenly spread, so that drawing samples takes as long in any scene.
+/// Most buckets that are sampled. They are evenly spread over all buckets, so that drawing samples takes as long in any
+/// scene.
 const SAMPLED: usize = 32;
 
-/// Rows of a piece of a tile that a bucket reads whole if one of them is its own.
+/// Number of rows of a piece of a tile. A bucket reads a piece as a whole if one of its rows is of the bucket.
 const RUN: usize = 4096;
 
-/// What is settled of a scene before any of it is looked at.
+/// Everything that is settled about a scene before its Gaussians are measured.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Plan {
-    /// What tells the plan from others: a checksum of all else, with the usual step.
+    /// Identifies the plan: a checksum of everything else in it.
     scene: u32,
     pub(super) options: PackOptions,
-    /// The overall step.
+    /// The overall step for which the scene is packed.
     pub(super) step: f64,
-    /// Of each tile the number of Gaussians before it; then their number in all.
+    /// The number of Gaussians before each tile, followed by the number of all Gaussians.
     firsts: Vec<u64>,
     pub(super) grid: Grid,
-    /// Sum of the expected weights of all Gaussians.
+    /// Sum of the guessed weights of all Gaussians.
     pub(super) guessed_total: f64,
     pub(super) kind: TileKind,
-    /// Where buckets end but the last: of all tiles, or of each on its own.
+    /// The end of each bucket but the last, in one list for all tiles, or in one list for each tile.
     ends: Vec<Vec<MortonKey>>,
 }
 messages!(Plan => "plan");
 
 impl Plan {
-    /// Plans a scene for pictures of about `decibels`. `tiles` has the name of each tile and the surveys of its blocks, in order.
-    /// With `one_each` every tile becomes a file of its own, with the steps, the dictionary and the tables of all.
+    /// Plans a scene for pictures of about `decibels` dB. `tiles` has the name of each tile and the surveys of its blocks,
+    /// in order. With `one_each`, every tile becomes a file of its own. All files then have the same steps, dictionary and
+    /// tables.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for options out of range and no tiles, [`Error::Format`] that names a tile without Gaussians or with
-    /// another degree, other extras or another mark than the first, [`Error::Limit`] for too many Gaussians.
+    /// [`Error::Parameter`] if options are out of range or there are no tiles. [`Error::Format`] that names a tile without
+    /// Gaussians, or with another SH degree, other extra properties or another antialiasing mark than the first.
+    /// [`Error::Limit`] if there are too many Gaussians.
     pub fn new(
         tiles: &[(String, Vec<Survey>)],
         options: &PackOptions,
@@ -65,7 +68,7 @@ impl Plan {
         Self::with_bucket(tiles, options, decibels, one_each, BUCKET)
     }
 
-    /// The same with buckets of about `bucket` Gaussians.
+    /// Plans a scene as [`Self::new`] does, with buckets of about `bucket` Gaussians.
     pub(crate) fn with_bucket(
         tiles: &[(String, Vec<Survey>)],
         options: &PackOptions,
@@ -126,24 +129,25 @@ impl Plan {
         let step = expected_step(gaussians, decibels);
         let mut plan =
             Self { scene: 0, options: options.clone(), step, firsts, grid, guessed_total, kind, ends };
-        // With its own checksum at the end, the checksum of any message is the same.
+        // The bytes of a message end with their own checksum. A checksum over all of them would be the same for any
+        // message.
         let bytes = plan.to_bytes();
         plan.scene = crc32::hash(bytes.split_last_chunk::<{ message::CHECKSUM }>().map_or(&[], |b| b.0));
         Ok(plan)
     }
 
-    /// How the scene is packed.
+    /// Returns the options with which the scene is packed.
     #[must_use]
     pub fn options(&self) -> &PackOptions {
         &self.options
     }
 
-    /// What tells the plan from others. What is made by it holds this.
+    /// Returns the number that identifies the plan. Every message that is made by the plan holds it.
     pub(super) fn scene(&self) -> u32 {
         self.scene
     }
 
-    /// Refuses `found` things called `kind` if they are of another scene or are not `expected` ones.
+    /// Refuses messages of the type `kind` if one of `scenes` is of another plan, or if their number is not `expected`.
     pub(super) fn check(
         &self,
         kind: &'static str,
@@ -160,37 +164,38 @@ impl Plan {
         }
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         usize::try_from(self.firsts.last().copied().unwrap_or(0)).unwrap_or(usize::MAX)
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Number of tiles.
+    /// Returns the number of tiles.
     #[must_use]
     pub fn tiles(&self) -> usize {
         self.firsts.len() - 1
     }
 
-    /// Whether every tile becomes a file of its own.
+    /// Returns whether every tile becomes a file of its own. For a scene of one tile it makes no difference, and the result
+    /// is false.
     #[must_use]
     pub fn is_one_each(&self) -> bool {
         self.ends.len() > 1
     }
 
-    /// Number of buckets.
+    /// Returns the number of buckets.
     #[must_use]
     pub fn buckets(&self) -> usize {
         self.ends.iter().map(|ends| ends.len() + 1).sum()
     }
 
-    /// The buckets of each file, in order.
+    /// Returns the numbers of the buckets of each file, in order.
     #[must_use]
     pub fn files(&self) -> Vec<Range<usize>> {
         let mut start = 0;
@@ -202,13 +207,14 @@ impl Plan {
         self.ends.iter().map(of).collect()
     }
 
-    /// Number of groups of buckets, each with a sample of its own.
+    /// Returns the number of groups of buckets. Each group has a sample of its own.
     #[must_use]
     pub fn groups(&self) -> usize {
         self.buckets().min(GROUPS)
     }
 
-    /// The buckets of a group: of all buckets some, evenly spread. None if there is no such group.
+    /// Returns the numbers of the buckets of a group. The buckets of all groups are evenly spread over the scene. Empty if
+    /// there is no such group.
     #[must_use]
     pub fn group(&self, group: usize) -> Vec<usize> {
         let (groups, sampled, buckets) = (self.groups(), self.sampled(), self.buckets());
@@ -216,21 +222,23 @@ impl Plan {
         own.filter(|_| group < groups).map(|k| k * buckets / sampled).collect()
     }
 
-    /// Number of buckets that are sampled.
+    /// Returns the number of buckets that are sampled.
     pub(super) fn sampled(&self) -> usize {
         self.buckets().min(SAMPLED)
     }
 
-    /// The blocks of a tile of `gaussians` Gaussians.
+    /// Returns the ranges of rows of the blocks of a tile of `gaussians` Gaussians.
     pub fn blocks(gaussians: usize) -> impl Iterator<Item = Range<usize>> {
         (0..gaussians).step_by(BLOCK).map(move |start| start..gaussians.min(start + BLOCK))
     }
 
-    /// Returns the rows, of `rows` of a tile, that each bucket has to read, by the bucket's number: runs of whole pieces of `RUN`
-    /// rows of which some are its own. Reports the bytes of the rows to `progress`.
+    /// Returns, by the number of each bucket, the rows among `rows` of a tile that the bucket has to read. They are runs of
+    /// whole pieces of `RUN` rows, and at least one row of each piece is of the bucket. Reports the bytes of the rows to
+    /// `progress`.
     ///
     /// # Errors
-    /// As [`Survey::of`], and [`Error::Parameter`] if there is no such tile.
+    /// Those of [`Survey::of`], and [`Error::Parameter`] if there is no such tile or it is not as it was when it was
+    /// surveyed.
     pub fn runs(
         &self,
         number: usize,
@@ -257,13 +265,14 @@ impl Plan {
         Ok(runs)
     }
 
-    /// The rows of a tile that each bucket gets, in pieces: of which bucket, and bytes for [`BucketReader::add_piece`]. For tiles that
-    /// lie all over the scene, which every bucket would have to read otherwise.
+    /// Returns the rows among `rows` of a tile that are of each bucket: the number of the bucket, and the bytes of a piece
+    /// for [`BucketReader::add_piece`]. It is for tiles whose rows are spread over the scene, since every bucket would have
+    /// to read all of such a tile.
     ///
     /// [`BucketReader::add_piece`]: super::BucketReader::add_piece
     ///
     /// # Errors
-    /// As [`Self::runs`].
+    /// Those of [`Self::runs`].
     pub fn scatter(
         &self,
         number: usize,
@@ -288,7 +297,7 @@ impl Plan {
         Ok(pieces.into_iter().map(of).collect())
     }
 
-    /// Hands `rows` of a tile to `take`, some at a time, with their places.
+    /// Calls `take` with successive parts of `rows` of a tile, and with the key of each Gaussian.
     pub(crate) fn each(
         &self,
         number: usize,
@@ -320,21 +329,21 @@ impl Plan {
         })
     }
 
-    /// The buckets of the Gaussians of a tile.
+    /// Returns the buckets of the Gaussians of a tile.
     pub(crate) fn buckets_of(&self, tile: usize) -> Buckets<'_> {
         let list = if self.is_one_each() { tile } else { 0 };
         let before = self.ends.iter().take(list).map(|ends| ends.len() + 1).sum();
         Buckets { before, ends: self.ends.get(list).map_or(&[], Vec::as_slice) }
     }
 
-    /// The number of the first Gaussian of the file that a bucket is of.
+    /// Returns the number of the first Gaussian of the file that has bucket `bucket`.
     pub(super) fn first_of_file(&self, bucket: usize) -> u64 {
         let files = self.files();
         let file = files.partition_point(|file| file.end <= bucket);
         if self.is_one_each() { self.firsts.get(file).copied().unwrap_or(0) } else { 0 }
     }
 
-    /// Number of Gaussians of the source of a file.
+    /// Returns the number of Gaussians of the source of a file.
     pub(super) fn gaussians_of_file(&self, file: usize) -> u64 {
         match self.firsts.get(file..file + 2) {
             Some(&[first, end]) if self.is_one_each() => end - first,
@@ -342,7 +351,7 @@ impl Plan {
         }
     }
 
-    /// A scene without Gaussians that has everything that all tiles have in common.
+    /// Returns a scene without Gaussians that has all properties that the tiles have in common.
     #[must_use]
     pub fn empty(&self) -> Splats {
         let extra =
@@ -357,22 +366,22 @@ impl Plan {
     }
 }
 
-/// Where buckets end, of a tile or of all.
+/// The ends of the buckets of one tile, or of all tiles.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Buckets<'p> {
-    /// Number of the buckets of the tiles before.
+    /// Number of buckets of earlier tiles.
     before: usize,
     ends: &'p [MortonKey],
 }
 
 impl Buckets<'_> {
-    /// The bucket of a Gaussian.
+    /// Returns the number of the bucket that a Gaussian is of.
     pub(crate) fn of(&self, key: MortonKey) -> usize {
         self.before + self.ends.partition_point(|end| *end <= key)
     }
 }
 
-/// Rows of a bucket.
+/// The rows of one bucket that are in one block of a tile.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Piece {
     pub(super) scene: u32,
@@ -382,7 +391,7 @@ pub(super) struct Piece {
 }
 
 impl Piece {
-    /// What its bytes are called.
+    /// The name of the type in messages.
     const KIND: &'static str = "piece";
 
     fn to_bytes(&self) -> Vec<u8> {
@@ -394,7 +403,7 @@ impl Piece {
     }
 }
 
-/// The offset of a scene of `tiles`, which is that of the same tiles joined.
+/// Returns the offset of the scene of `tiles`. Joining the same tiles gives the same offset.
 fn shared_offset(tiles: &[(String, Vec<Survey>)]) -> Option<Offset> {
     let of = |blocks: &Vec<Survey>| {
         let gaussians = blocks.iter().map(|block| block.gaussians).fold(0, u64::saturating_add);

@@ -1,4 +1,4 @@
-//! The Gaussians of a group of buckets that predictors and dictionary are found from.
+//! A sample of the Gaussians of a group of buckets, from which predictors and the dictionary are found.
 
 use half::f16;
 use serde::{Deserialize, Serialize};
@@ -17,23 +17,23 @@ use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 use crate::support::rng::SplitMix64;
 
-/// Approximate number of Gaussians that predictors are fitted to.
+/// Approximate number of Gaussians to which predictors are fitted.
 const FITTED: usize = 1 << 19;
-/// Gaussians of a run of the sample. They are neighbours in the file.
+/// Number of Gaussians of a run of the sample. They follow one another in the file.
 const RUN: usize = 2048;
 
-/// Some Gaussians of a group of buckets.
+/// A sample of the Gaussians of a group of buckets.
 #[derive(Debug, Default)]
 pub struct Sample {
     parts: Vec<Part>,
 }
 
-/// Those of one bucket.
+/// The sample of one bucket.
 #[derive(Debug)]
 struct Part {
     bucket: usize,
     splats: Splats,
-    /// Cells, and numbers among the Gaussians.
+    /// The cell of each Gaussian, and its number in `splats`.
     scene: Vec<MortonKey>,
     weights: Vec<[f32; 2]>,
     stays: Vec<bool>,
@@ -44,11 +44,12 @@ struct Part {
 pub struct SampleStatistics {
     scene: u32,
     pub(super) predictors: Predictors,
-    /// By how many classes shapes ask for smaller steps.
+    /// Most octaves by which the shape of a Gaussian asks for smaller steps than those of class 0.
     pub(super) over: f32,
-    /// The largest coordinate of each base colour.
+    /// Histogram of the largest coordinate of each base colour.
     pub(super) dc: Histogram,
-    /// Rows in units of their value steps, as bytes of 16-bit floats. They differ from the rows by far less than a step.
+    /// Rows in units of their value steps, as bytes of 16-bit floats. They differ from the exact rows by far less than a
+    /// step.
     rows: Vec<u8>,
     /// The colour class of each row.
     classes: Vec<u8>,
@@ -57,20 +58,20 @@ pub struct SampleStatistics {
 messages!(SampleStatistics => "sample statistics");
 
 impl Sample {
-    /// No Gaussians yet.
+    /// Creates an empty sample.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds the next bucket of the group.
+    /// Adds Gaussians of the next bucket of the group.
     ///
     /// # Errors
     /// [`Error::Parameter`] if `looked` is of another bucket.
     pub fn add(&mut self, plan: &Plan, bucket: &Bucket, looked: &Looked) -> Result<()> {
         let n = bucket.splats.len();
         let (weights, stays) = looked.of_each(plan, bucket, false)?;
-        // Of so many runs one is taken, in the next bucket the next.
+        // One of `every` runs is taken. In the next bucket it is the next run.
         let share = plan.sampled() as f64 / plan.buckets().max(1) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
         let every = ((plan.len() as f64 * share / FITTED as f64).ceil() as usize).max(1);
@@ -92,7 +93,7 @@ impl Sample {
         Ok(())
     }
 
-    /// Sums over the sample.
+    /// Sums up the sample.
     ///
     /// # Errors
     /// [`Error::Parameter`] if `steps` are of another scene.
@@ -116,7 +117,8 @@ impl Sample {
         Ok(out)
     }
 
-    /// Adds rows to learn from. Each bucket gives as many as its share of the Gaussians that stay.
+    /// Adds rows to learn the dictionary from. The number of rows of each bucket is proportional to the Gaussians of it
+    /// that stay.
     fn add_rows(&self, out: &mut SampleStatistics, plan: &Plan, steps: &Steps) {
         let kept = |bucket: usize| steps.kept.get(bucket).copied().unwrap_or(0) as f64;
         let sampled = (0..plan.groups()).flat_map(|group| plan.group(group));
@@ -140,7 +142,7 @@ impl Sample {
     }
 }
 
-/// The bytes of `x` as a 16-bit float, the nearest that is finite.
+/// Returns the bytes of the finite 16-bit float nearest to `x`.
 fn half_bytes(x: f32) -> [u8; 2] {
     let most = f16::MAX.to_f32();
     f16::from_f32(x.clamp(-most, most)).to_le_bytes()
@@ -164,7 +166,7 @@ impl SampleStatistics {
         }
     }
 
-    /// The sums and the rows of all groups, in order.
+    /// Returns the sums and the rows of all groups, which are in order.
     pub(super) fn sum(plan: &Plan, groups: &[Self]) -> Result<Self> {
         plan.check("sample statistics", groups.iter().map(|group| group.scene), Some(plan.groups()))?;
         let mut out = Self::none(plan);
@@ -186,7 +188,7 @@ impl SampleStatistics {
         Ok(out)
     }
 
-    /// The rows in random order, and their classes.
+    /// Returns the rows in random order, and their classes in the same order.
     pub(super) fn shuffled(&self, plan: &Plan) -> (Vec<f32>, Vec<u8>) {
         let bytes = plan.kind.degree.rest() * size_of::<f16>();
         let (mut rows, mut classes) = (Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! The steps of a scene, from what looks at all of its buckets say.
+//! The steps of a scene, from the statistics of all of its buckets.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,28 +12,28 @@ use crate::packed::encode::floor::Floor;
 use crate::packed::encode::layering::Layering;
 use crate::support::error::{Error, Result};
 
-/// The steps of a scene, without predictors and dictionary.
+/// The steps of a scene, without predictors and without the dictionary.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Steps {
     pub(super) scene: u32,
     pub(super) steps: fit::Steps,
-    /// The limits of steps before the shapes of Gaussians are known.
+    /// The limits of steps, without those that depend on the shapes of Gaussians.
     pub(super) floor: Floor,
     pub(super) layering: Layering,
     pub(super) stop: StopRule,
-    /// Of each bucket the number of Gaussians that stay.
+    /// Number of Gaussians of each bucket that stay.
     pub(super) kept: Vec<u64>,
-    /// The buckets of which the first Gaussian stays though it is not worth its bits: the first one of a file of which none
-    /// would stay.
+    /// Numbers of the buckets whose first Gaussian stays although it is not worth its bits. If no Gaussian of a file would
+    /// stay, its first bucket with Gaussians is one of them.
     first_stays: Vec<usize>,
 }
 messages!(Steps => "steps");
 
 impl Steps {
-    /// The steps of a scene. `buckets` are the statistics of all, in order.
+    /// Computes the steps of a scene. `buckets` holds the statistics of all buckets, in order.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if they are not those of all buckets.
+    /// [`Error::Parameter`] if `buckets` are not the statistics of all buckets, in order.
     pub fn new(plan: &Plan, buckets: &[LookStatistics]) -> Result<Self> {
         plan.check("look statistics", buckets.iter().map(|bucket| bucket.scene), Some(plan.buckets()))?;
         let in_order = buckets.iter().enumerate().all(|(number, bucket)| bucket.bucket == number);
@@ -69,13 +69,13 @@ impl Steps {
         })
     }
 
-    /// Number of Gaussians of the scene that stay.
+    /// Returns the number of Gaussians of the scene that stay.
     #[must_use]
     pub fn kept(&self) -> usize {
         usize::try_from(self.kept.iter().sum::<u64>()).unwrap_or(usize::MAX)
     }
 
-    /// Whether the first Gaussian of a bucket stays in any case.
+    /// Returns whether the first Gaussian of a bucket stays in any case.
     pub(super) fn first_stays(&self, bucket: usize) -> bool {
         self.first_stays.contains(&bucket)
     }

@@ -1,4 +1,4 @@
-//! What is known of some rows of a tile before the scene is planned.
+//! Surveys of the rows of a tile, from which a scene is planned.
 
 use std::ops::Range;
 
@@ -15,32 +15,32 @@ use crate::support::maths::Vec3;
 use crate::support::progress::Progress;
 use crate::support::rng::SplitMix64;
 
-/// Rows that are surveyed and counted together.
+/// Most rows of a survey.
 pub const BLOCK: usize = 262_144;
-/// Of so many rows the position of one is kept. Grid and buckets depend on these.
+/// Number of rows of which the position of one is kept. The grid and the buckets depend on these positions.
 pub(super) const STRIDE: usize = 128;
-/// Mixed into the seed of the choice of rows.
+/// Mixed into the seed with which rows are chosen.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
-/// What is known of a block of rows of a tile.
+/// A survey of a block of rows of a tile.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Survey {
     pub(super) gaussians: u64,
     pub(super) bounds: Option<Bounds>,
-    /// Sum of the expected weights of all.
+    /// Sum of the guessed weights of all Gaussians of the block.
     pub(super) guessed_total: f64,
-    /// Rows of the block and their positions, one of every [`STRIDE`] rows.
+    /// The number in the block, and the position, of one of every [`STRIDE`] rows.
     pub(super) positions: Vec<(u32, Vec3)>,
     pub(super) kind: TileKind,
 }
 messages!(Survey => "survey");
 
 impl Survey {
-    /// Looks at `rows` of `tile`, at most [`BLOCK`] of them, which begin at a multiple of it. Reports their bytes to
+    /// Surveys `rows` of `tile`: at most [`BLOCK`] rows, which begin at a multiple of it. Reports their bytes to
     /// `progress`.
     ///
     /// # Errors
-    /// Those of reading, and [`crate::Error::Cancelled`].
+    /// Those of reading the tile, and [`crate::Error::Cancelled`].
     pub fn of(
         tile: &dyn SplatSource,
         rows: Range<usize>,
@@ -64,7 +64,7 @@ impl Survey {
             survey.bounds.get_or_insert(bounds).add(bounds);
             survey.guessed_total = guessed_total(survey.guessed_total, geometry);
             while let Some(row) = chosen.next_if(|row| own.contains(row)) {
-                // Blocks have few rows.
+                // A block has at most [`BLOCK`] rows.
                 let number = u32::try_from(row - rows.start).unwrap_or(u32::MAX);
                 survey.positions.push((number, geometry.positions[row - own.start]));
             }
@@ -73,8 +73,8 @@ impl Survey {
         Ok(survey)
     }
 
-    /// Refuses the tile `name` that this block is of, if it has no Gaussians or does not go together with the tile that `before` is
-    /// of.
+    /// Refuses the tile `name` of this block if the block has no Gaussians, or if the tile does not agree with the tile of
+    /// `before`.
     ///
     /// # Errors
     /// [`Error::Format`] that names the tile.
@@ -82,13 +82,13 @@ impl Survey {
         self.kind.check(name, before.map(|before| &before.kind), self.gaussians)
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         usize::try_from(self.gaussians).unwrap_or(usize::MAX)
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.gaussians == 0

@@ -1,4 +1,4 @@
-//! The steps as separate processes take them.
+//! The steps, as separate processes take them.
 
 use super::*;
 use crate::packed::PackOptions;
@@ -8,7 +8,7 @@ use crate::stream::{self, Observed};
 use crate::support::sink::Sink;
 use crate::{Error, Extra, ExtraValues, Limits, Offset, Result, Sensitivity, ShDegree, Silent, lexi};
 
-/// Gaussians of a bucket of these tests.
+/// Number of Gaussians of a bucket in these tests.
 const SMALL: usize = 9000;
 
 fn scene(count: usize, seed: u64) -> Splats {
@@ -33,7 +33,8 @@ fn surveys(tiles: &[Splats]) -> Vec<(String, Vec<Survey>)> {
     tiles.iter().enumerate().map(of).collect()
 }
 
-/// The files that workers make of `tiles`, of which each step begins with bytes and takes buckets and groups last one first.
+/// Returns the files that separate processes make of `tiles`. Each step reads its input from bytes, and buckets and groups
+/// are taken in reverse order.
 fn by_workers(tiles: &[Splats], one_each: bool) -> Vec<Vec<u8>> {
     let plan = Plan::with_bucket(&surveys(tiles), &options(), 38.0, one_each, SMALL).unwrap();
     let plan = Plan::from_bytes(&plan.to_bytes()).unwrap();
@@ -110,7 +111,7 @@ fn by_workers(tiles: &[Splats], one_each: bool) -> Vec<Vec<u8>> {
     plan.files().into_iter().enumerate().map(file).collect()
 }
 
-/// `splats` in so many tiles of different lengths.
+/// Cuts `splats` into `tiles` tiles of different lengths.
 fn cut(splats: &Splats, tiles: usize) -> Vec<Splats> {
     let ends: Vec<usize> = (0..=tiles).map(|k| splats.len() * k * (k + 3) / (tiles * (tiles + 3))).collect();
     let part = |pair: &[usize]| {
@@ -200,7 +201,7 @@ fn damaged_messages_and_those_of_other_scenes_are_refused() {
         }
         Ok(reader.finish())
     };
-    // A tile that changed since it was surveyed.
+    // The second tile is not the one that was surveyed.
     let error = bucket(&[tiles[0].clone(), tiles[0].clone()]).unwrap_err().to_string();
     assert!(error.contains("as when it was surveyed"), "{error}");
     let whole = bucket(&tiles).unwrap();
@@ -224,14 +225,14 @@ fn a_bucket_that_asks_for_half_the_step_weighs_four_times_as_much() {
     let weights = |looked: &Looked| looked.of_each(&plan, &bucket, false).unwrap().0;
     let (usual, half) = (looked(1.0).unwrap(), looked(0.5).unwrap());
     for ((own, usual), half) in own.appearances().iter().zip(weights(&usual)).zip(weights(&half)) {
-        // Weights are remembered to an eighth of an octave.
+        // Weights are rounded to an eighth of an octave.
         let is_about = |a: f32, b: f32| (a / b).log2().abs() < 0.07;
         assert!(
             is_about(usual[0], 0.75 * own[0]) && is_about(half[0], 4.0 * usual[0]),
             "{own:?} {usual:?} {half:?}"
         );
     }
-    // The observer is given its own weights again.
+    // The observer gets its own weights back.
     let again = [half.observed(&weights(&half)), usual.observed(&weights(&usual))];
     for (a, b) in again[0].iter().zip(&again[1]) {
         assert!((a[1] / b[1]).log2().abs() < 0.07, "{a:?} {b:?}");
@@ -241,7 +242,7 @@ fn a_bucket_that_asks_for_half_the_step_weighs_four_times_as_much() {
     }
 }
 
-/// A bucket of its own plan, coded, and what it was coded with.
+/// Returns a scene of one bucket: its plan, its coding, its counts and the coded bucket.
 fn coded() -> (Plan, Coding, Counts, Coded) {
     let tiles = [scene(3000, 4)];
     let plan = Plan::new(&surveys(&tiles), &options(), 38.0, false).unwrap();
@@ -262,11 +263,11 @@ fn coded() -> (Plan, Coding, Counts, Coded) {
 #[test]
 fn buckets_are_coded_anew_without_a_change() {
     let (plan, coding, counts, coded) = coded();
-    // The tables of this bucket alone are its own.
+    // The tables of this bucket alone are those that it is coded with.
     let tables = Tables::new(std::slice::from_ref(&counts)).unwrap();
     let same = coded.clone().with_tables(&plan, &coding, &tables).unwrap();
     assert!(same.to_bytes() == coded.to_bytes());
-    // Other tables, and back.
+    // Recodes the bucket with other tables, and back.
     let mut more = counts.clone();
     more.counts.add(&counts.counts);
     let other = Tables::new(&[more, counts.clone()]).unwrap();
@@ -287,7 +288,8 @@ fn damaged_buckets_are_refused_or_are_others() {
     assert!(refused > 300, "{refused}");
 }
 
-/// Tiles of a survey, each with an offset of its own, become one scene on workers and in one process.
+/// Tiles of a geographic survey, each with an offset of its own, become one scene, by separate processes and in one
+/// process.
 #[test]
 fn tiles_with_other_offsets_are_one_scene() {
     let mut tiles = [scene(6000, 1), scene(7000, 2), scene(5000, 3)];
@@ -306,7 +308,7 @@ fn tiles_with_other_offsets_are_one_scene() {
     assert_eq!(far.count(), 0);
 }
 
-/// What was made for one scene is refused by another, whatever its shape.
+/// Messages of one scene are refused by another, whatever its degree.
 #[test]
 fn messages_of_another_scene_are_refused() {
     let (plan, coding, counts, coded) = coded();

@@ -1,4 +1,4 @@
-//! The coder of a range against one that is written plainly, a lane at a time.
+//! Tests of the range coder against a plain one that codes a lane at a time.
 
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::script::{Ask, ask, tables_of};
 use crate::packed::entropy::tables::{ALL_CONTEXTS, Histogram, Lookup};
 
-/// What a script codes, in how many lanes.
+/// A script, and the number of lanes in which it is coded.
 fn scripts() -> impl Strategy<Value = (usize, Vec<Ask>)> {
     let value = (any::<u64>(), 0_u32..64).prop_map(|(value, shift)| value >> shift);
     let set = prop_oneof![Just(0xffff), any::<u16>()];
@@ -26,8 +26,8 @@ fn scripts() -> impl Strategy<Value = (usize, Vec<Ask>)> {
     })
 }
 
-/// The script with one kind of number in each slot, as in files. With several kinds in one slot its table has tokens that are too
-/// large for some of them, which are read as the largest that are not.
+/// Changes the script so that each slot has one kind of number, as in files. With several kinds in one slot, its table has
+/// tokens that are too large for some kinds. A decoder reads these as the largest token that is not too large.
 fn one_kind_a_slot(script: Vec<Ask>) -> Vec<Ask> {
     let slots = Slot::all().count();
     let kind = |slot: u8| u8::try_from(usize::from(slot) % slots % 5).unwrap();
@@ -51,7 +51,7 @@ fn coded(lanes: usize, script: &[Ask]) -> Coded {
     Coded { tables, histograms, recorder, values, range }
 }
 
-/// What `range` says, and whether nothing is left of it; `None` if it is refused.
+/// Decodes `range`. Returns the values, and whether nothing was left of the range; `None` if the range is refused.
 fn played(tables: &Tables, range: &[u8], lanes: usize, script: &[Ask]) -> Option<(Vec<[u64; LANES]>, bool)> {
     let lookup = Lookup::new(tables);
     let mut player = SymbolDecoder::new(&lookup, range, lanes, false)?;
@@ -59,7 +59,7 @@ fn played(tables: &Tables, range: &[u8], lanes: usize, script: &[Ask]) -> Option
     Some((values, player.exhausted()))
 }
 
-/// The decoder of one lane: a state of 64 bits, and the words that follow.
+/// A plain decoder of one lane: a state of 64 bits, and the words that follow.
 struct Naive<'a> {
     tables: &'a Tables,
     /// The symbols that occur in each context.
@@ -69,7 +69,7 @@ struct Naive<'a> {
 }
 
 impl<'a> Naive<'a> {
-    /// The decoders of all lanes of a range.
+    /// Creates the decoders of all lanes of a range.
     fn all(tables: &'a Tables, symbols: &'a [Vec<u8>], range: &[u8], lanes: usize) -> Vec<Self> {
         // Short ranges have lengths of two bytes.
         let width = if range.len() < 1 << 17 { 2 } else { 4 };
@@ -89,7 +89,7 @@ impl<'a> Naive<'a> {
         out
     }
 
-    /// States are 65,536 or more.
+    /// A state is at least 65,536.
     fn refill(&mut self) {
         if self.state < 65_536 {
             self.state = self.state * 65_536 + self.words.remove(0);
@@ -134,15 +134,15 @@ impl<'a> Naive<'a> {
         if token < 16 {
             return token;
         }
-        // Numbers of n bits from 5 on have two tokens, by the bit after the leading one.
+        // Numbers of five bits and more have two tokens for each length, by the bit after the leading one.
         let low = u32::try_from((token - 16) / 2).unwrap() + 3;
-        // More than 32 bits come in two numbers, low ones first.
+        // More than 32 bits come as two numbers, the low bits first.
         let first = self.bits(low.min(32));
         let second = self.bits(low.saturating_sub(32));
         ((2 + token % 2) << low) + (second << 32) + first
     }
 
-    /// What lane `l` of the entry holds.
+    /// Decodes the value of lane `l` of an entry.
     fn ask(&mut self, a: &Ask, l: usize) -> u64 {
         let slot = Slot::all().nth(usize::from(a.slot) % Slot::all().count()).unwrap();
         let context = u32::from(a.context) + u32::from(l % 3 == 2);
@@ -189,7 +189,7 @@ proptest! {
         }
     }
 
-    /// Bytes are what tables say, and two words for each state and two for each length.
+    /// The length is what the tables say, plus two words for the state of each lane and two bytes or four for each length.
     #[test]
     fn bits_are_those_of_the_tables((lanes, script) in scripts()) {
         let Coded { tables, histograms, recorder, range, .. } = coded(lanes, &script);
@@ -199,7 +199,8 @@ proptest! {
         let bits = f64::from(raw) + modelled;
         let written = 8.0 * range.len() as f64;
         let lengths = if range.len() < 1 << 17 { 16.0 } else { 32.0 } * (lanes - 1) as f64;
-        // Of the 32 bits of a state 16 are those it begins with. Shares are rounded down in states of 16 bits or more.
+        // Of the 32 bits of a state, 16 are those with which it starts. Shares are rounded down in states of 16 bits or
+        // more.
         prop_assert!(written >= bits + lengths - 1.0);
         prop_assert!(written <= 1.01 * bits + lengths + 32.0 * lanes as f64, "{written} for {bits}");
         let lookup = Lookup::new(&tables);
@@ -218,7 +219,7 @@ proptest! {
         prop_assert_eq!(again.finish(&tables, lanes), range);
     }
 
-    /// Coding is one to one: other words are left over, or say something else.
+    /// Coding is one to one: with other words, words are left over or values differ.
     #[test]
     fn other_words_are_noticed((lanes, script) in scripts(), at in any::<prop::sample::Index>(), change in 1..=u8::MAX) {
         let script = one_kind_a_slot(script);
