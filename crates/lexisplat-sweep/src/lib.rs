@@ -1,4 +1,24 @@
-//! Evaluation of many models at many settings, as the paper has it: compressed, drawn, scored and tabulated.
+//! Evaluates many models at many settings, as the paper does: compresses, draws, scores and tabulates them.
+//!
+//! A manifest lists the models:
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! let text = r#"
+//!     [[scene]]
+//!     dataset = "Mip-NeRF 360"
+//!     name = "bonsai"
+//!     method = "3dgs"
+//!     model = "3dgs/bonsai/point_cloud.ply"
+//! "#;
+//! let entries = lexisplat_sweep::parse_manifest(Path::new("scenes.toml"), text, Path::new("models"))?;
+//! assert_eq!(entries[0].model, Path::new("models/3dgs/bonsai/point_cloud.ply"));
+//! # Ok::<(), lexisplat_compress::Error>(())
+//! ```
+//!
+//! Start with [`sweep`](fn@sweep), which evaluates such entries and returns [`Results`], and with [`write_report`], which writes
+//! the tables, figures and the page of [`Results`]. docs/EVALUATION.md describes manifests and outputs.
 
 mod cache;
 mod compress_scene;
