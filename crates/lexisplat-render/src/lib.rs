@@ -1,8 +1,8 @@
 //! Cameras and rasterisers that draw 3D Gaussian Splatting scenes.
 //!
 //! [`render`] draws a [`Scene`]: a trained model with dense SH, or a compressed model. [`Radiance`] evaluates
-//! the view-dependent colours of both; a compressed model is drawn from its sparse codes, without dense SH. The rules and numbers are those of the 3DGS authors' rasteriser
-//! ([`conventions`]).
+//! the view-dependent colours of both; a compressed model is drawn from its sparse codes, without dense SH. The rules
+//! and numbers are those of the 3DGS authors' rasteriser ([`conventions`]).
 //!
 //! ```
 //! use lexisplat::{Geometry, ShDegree, Splats};
