@@ -96,7 +96,7 @@ pub use command::{Command, Mode, Quality, Slot};
 pub use compose::{Composer, Rgb8Image};
 pub use error::{Error, Result};
 pub use gesture::Drag;
-/// Vectors of three numbers in double precision, as [`SceneBounds`] and [`keys::flight`] have them.
+/// Vectors of three numbers in double precision, used by [`SceneBounds`] and [`keys::flight`].
 pub use glam::DVec3;
 #[cfg(feature = "window")]
 pub use options::Options;
