@@ -50,16 +50,16 @@ pub use whole::Whole;
 use lexisplat::Limits;
 use wasm_bindgen::JsError;
 
-/// Most bytes of arrays made of one file: half of what 32-bit WebAssembly can address, so that a file is refused before memory
-/// runs out.
+/// Largest number of bytes of arrays made of one file. It is half of what 32-bit WebAssembly can address, so that a file
+/// is refused before memory runs out.
 const MOST_BYTES: u64 = 2 << 30;
 
-/// The limits of all readers here.
+/// Returns the limits of all readers of this crate.
 fn limits() -> Limits {
     Limits::default().with_bytes(MOST_BYTES)
 }
 
-/// The error that JavaScript sees.
+/// Returns the error for JavaScript.
 fn thrown(error: impl std::fmt::Display) -> JsError {
     JsError::new(&error.to_string())
 }
