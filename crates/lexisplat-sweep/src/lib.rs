@@ -56,7 +56,7 @@ use lexisplat_eval::format::csv_cell;
 
 use figures::Figure;
 
-/// `name`, or the first of `name-2`, `name-3` and so on that is not `taken`.
+/// Returns `name`, or the first of `name-2`, `name-3` and so on that is not `taken`.
 fn unique(name: &str, taken: impl Fn(&str) -> bool) -> String {
     let mut unique = name.to_owned();
     let mut copy = 2;
@@ -67,7 +67,8 @@ fn unique(name: &str, taken: impl Fn(&str) -> bool) -> String {
     unique
 }
 
-/// Records as CSV (RFC 4180, lines end with a line feed). Text that a spreadsheet would take for a formula begins with `'`.
+/// Returns records as CSV (RFC 4180, with line feeds). A text that a spreadsheet would take for a formula gets a `'`
+/// before it.
 fn csv_text(records: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
     for record in records {
