@@ -68,6 +68,15 @@ impl<'a> From<&'a dyn SplatSource> for Source<'a> {
 /// Begins to compress `source`, a path or splats. [`Compress::write`] and [`Compress::to_bytes`] run the compression.
 /// Without other choices the quality is [`Preset::Balanced`]. It is judged by cameras that lie beside the file and seem to
 /// belong to the scene, or else by views like photographs, which a search finds.
+///
+/// ```
+/// use lexisplat_sample::{SampleOptions, scene};
+///
+/// let splats = scene(&SampleOptions::new(2000, 0));
+/// let (file, report) = lexisplat_compress::compress(&splats).psnr(36.0).to_bytes()?;
+/// assert_eq!(report.file_bytes, file.len() as u64);
+/// # Ok::<(), lexisplat_compress::Error>(())
+/// ```
 pub fn compress<'a>(source: impl Into<Source<'a>>) -> Compress<'a> {
     Compress {
         source: source.into(),

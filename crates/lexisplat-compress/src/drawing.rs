@@ -31,6 +31,9 @@ impl DrawOptions {
     }
 
     /// Draws the view of `scene` from `camera`. `renderer` must have prepared the scene.
+    ///
+    /// # Errors
+    /// [`crate::Error::Render`] as [`Renderer::render`].
     pub fn draw(&self, renderer: &mut Renderer, scene: &Prepared<'_>, camera: &Camera) -> Result<Image> {
         let drawing =
             RenderOptions::default().with_background(self.background).with_max_degree(self.max_degree);
@@ -43,6 +46,10 @@ impl DrawOptions {
 }
 
 /// Draws `scene` from every camera. Reports [`Stage::Draw`] to `progress`, in views.
+///
+/// # Errors
+/// [`crate::Error::Render`] as [`Renderer::prepare`] and [`Renderer::render`]. [`crate::Error::Codec`] if
+/// `progress` cancels.
 pub fn draw_views(
     renderer: &mut Renderer,
     scene: &Scene<'_>,

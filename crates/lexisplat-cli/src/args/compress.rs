@@ -32,12 +32,12 @@ pub(crate) struct Compress {
     /// 35, 40, 45 and 54 dB [default: balanced].
     #[arg(long, value_parser = preset(), group = "goal", value_name = "NAME", help_heading = TARGET)]
     pub(crate) preset: Option<Preset>,
-    /// Make the smallest file whose judging views have a mean PSNR of at least DB decibels, above 0, such as 40. With
-    /// cameras the mean is over all judging views, otherwise over the quarter of them with the lowest PSNR.
+    /// Make the smallest file with a mean PSNR of at least DB decibels, above 0, such as 40. With cameras the mean is
+    /// over all views from which the file is judged, otherwise over the quarter of these views with the lowest PSNR.
     #[arg(long, group = "goal", value_name = "DB", value_parser = real::<f64>("40"), help_heading = TARGET)]
     pub(crate) psnr: Option<f64>,
-    /// Make the smallest file whose every judging view has a PSNR of at least DB decibels, above 0, such as 38. Other
-    /// views of the scene may be worse.
+    /// Make the smallest file with a PSNR of at least DB decibels, above 0, such as 38, in each view from which the file
+    /// is judged. Other views of the scene may be worse.
     #[arg(long, group = "goal", value_name = "DB", value_parser = real::<f64>("40"), help_heading = TARGET)]
     pub(crate) min_psnr: Option<f64>,
     /// Make the best file of at most BYTES bytes, such as 10MB or 800kB.
