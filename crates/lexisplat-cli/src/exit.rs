@@ -1,4 +1,4 @@
-//! How the program ends: what it says about a failure, and an exit code that tells whose fault it was.
+//! The end of the program: messages about a failure, and exit codes that tell whose fault it was.
 
 use std::borrow::Cow;
 use std::io::ErrorKind;
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::terminal::{note, print_json};
 
-/// Shown at the end of `--help`.
+/// Text at the end of `--help`.
 pub(crate) const AFTER_HELP: &str = "Exit codes:
   0  success
   1  unexpected failure
@@ -32,36 +32,36 @@ Environment:
   LEXISPLAT_SIMD  The vector instructions to use: `plain`, `avx2` or `avx512` [default: the widest
                   that the CPU has]. Results do not depend on it.";
 
-/// Advice for an output that is already there.
+/// Advice for an output that exists.
 const OVERWRITE: &str = "give --overwrite to replace it, or name another output";
 /// Advice for work that a GPU cannot do.
 const USE_CPU: &str = "--device cpu draws without a GPU";
 
-/// An output that is already there.
+/// The error for an output that exists.
 #[derive(Debug, thiserror::Error)]
 #[error("{0} exists")]
 pub(crate) struct OutputExists(pub(crate) String);
 
-/// A folder where a scene's file is needed.
+/// The error for a folder in place of a scene's file.
 #[derive(Debug, thiserror::Error)]
 #[error("{folder}: this is a folder, not a file")]
 pub(crate) struct IsFolder {
     pub(crate) folder: String,
-    /// A file that could be meant.
+    /// A file that may have been meant.
     pub(crate) example: String,
 }
 
-/// Files on the command line that cannot be meant so.
+/// The error for files on the command line that cannot be used in this way.
 #[derive(Debug, thiserror::Error)]
 #[error("{problem}")]
 pub(crate) struct Misuse {
-    /// What is wrong, starting with the file.
+    /// What is wrong, starting with the name of the file.
     pub(crate) problem: String,
-    /// What was probably meant, and how to say it.
+    /// What was probably meant, and the command line for it.
     pub(crate) help: String,
 }
 
-/// Whose fault a failure is. The number is the exit code, and JSON has the name.
+/// The kind of a failure, which tells whose fault it is. The number is the exit code. JSON has the name.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Kind {
@@ -75,7 +75,7 @@ enum Kind {
     Graphics,
 }
 
-/// The kind of an error, and what to do about it.
+/// The kind of an error, and advice against it.
 type Blame = (Kind, Option<Cow<'static, str>>);
 
 fn classify(error: &anyhow::Error) -> Blame {
@@ -137,7 +137,8 @@ fn compression(error: &lexisplat_compress::Error) -> Blame {
     }
 }
 
-/// What the library calls the values of scenes and cameras. No option has such a name: they come from files.
+/// Names that the library uses for values of scenes and cameras. No option has such a name, because these values come
+/// from files.
 const OF_FILES: [&str; 14] = [
     "values",
     "position",
@@ -155,7 +156,7 @@ const OF_FILES: [&str; 14] = [
     "geometry",
 ];
 
-/// The blame for the parameter `name` of the library: of the user, or of a file.
+/// Returns the blame for the library's parameter `name`: a user's option or a file.
 fn parameter(name: &str) -> Blame {
     match OF_FILES.contains(&name) {
         true => (
@@ -213,15 +214,15 @@ fn render(error: &lexisplat_render::Error) -> Blame {
 /// The advice if there is no room for a temporary file.
 const TEMPORARY_FILES: &str = "free space in that folder; temporary files lie beside the output, or in $TMPDIR if the output is standard output";
 
-/// Whether the system found no room.
+/// Returns whether the system found no space.
 fn is_full(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
 }
 
-/// What the system refused.
+/// Returns the blame for an error of the system.
 fn io(source: &std::io::Error) -> Blame {
     let advice = match source.kind() {
-        // An output that came into being after it was looked for.
+        // The output came into existence after the check.
         ErrorKind::AlreadyExists => return (Kind::Exists, Some(OVERWRITE.into())),
         _ if is_full(source) => "free space there, or name an output on another disk with -o",
         ErrorKind::FileTooLarge => {
@@ -234,7 +235,7 @@ fn io(source: &std::io::Error) -> Blame {
 
 /// Reports `error`, as a JSON object on standard output or as text on standard error. Returns its exit code.
 pub(crate) fn report(error: &anyhow::Error, json: bool) -> ExitCode {
-    // A reader that closed the pipe has seen enough.
+    // A reader that has closed the pipe needs no more output.
     if error.chain().any(|cause| {
         cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
     }) {
@@ -242,7 +243,7 @@ pub(crate) fn report(error: &anyhow::Error, json: bool) -> ExitCode {
     }
     let mut message = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {
-        // Most errors already say what their cause said.
+        // Most errors already contain the text of their cause.
         if !message.contains(&cause) {
             message = format!("{message}: {cause}");
         }
@@ -259,15 +260,14 @@ pub(crate) fn report(error: &anyhow::Error, json: bool) -> ExitCode {
     ExitCode::from(kind as u8)
 }
 
-/// Reports what the parser of the command line refused, or prints the help that was asked for. Returns the exit
-/// code.
+/// Reports an error of the command-line parser, or prints the help that was asked for. Returns the exit code.
 pub(crate) fn report_usage(error: &clap::Error, json: bool) -> ExitCode {
     if !error.use_stderr() {
         let _ = error.print();
         return ExitCode::SUCCESS;
     }
     let text = error.render().to_string();
-    // Paragraphs: what is wrong, what could be meant, and the usage.
+    // The paragraphs are: the error, a suggestion, and the usage.
     let mut paragraphs = text.split("\n\n").map(|part| part.split_whitespace().collect::<Vec<_>>().join(" "));
     let message = paragraphs.next().unwrap_or_default();
     let message = message.strip_prefix("error: ").unwrap_or(&message);

@@ -1,4 +1,4 @@
-//! Files in and out: scenes by content, `-` for pipes, outputs that are never half written.
+//! Input and output files: scenes recognised by content, `-` for pipes, and outputs that appear whole or not at all.
 
 use std::borrow::Cow;
 use std::ffi::OsStr;
@@ -22,28 +22,29 @@ use crate::exit::{IsFolder, Misuse, OutputExists};
 use crate::terminal::STANDARD_OUTPUT;
 pub(crate) use crate::terminal::{note, print, print_json, warn};
 
-/// What messages call standard input.
+/// Name of standard input in messages.
 const STANDARD_INPUT: &str = "standard input";
-/// Extensions of scene formats. An output of one kind under the extension of another would mislead.
+/// Extensions of scene formats. An output of one format with the extension of another would mislead.
 const SCENE_EXTENSIONS: [&str; 8] = ["lexi", "ply", "splat", "ksplat", "spz", "sog", "glb", "gltf"];
-/// Most entries of a folder that are looked at for a scene to advise.
+/// Largest number of entries of a folder that are searched for a scene to suggest.
 const MOST_ENTRIES: usize = 1000;
-/// Extensions of pictures, which the names of cameras often end in.
+/// Extensions of pictures, because names of cameras often end with one.
 const PICTURE_EXTENSIONS: [&str; 9] = ["bmp", "exr", "heic", "jpeg", "jpg", "png", "tif", "tiff", "webp"];
-/// Longest part of a camera's name in the name of a picture, in characters.
+/// Largest number of characters of a camera's name in the name of a picture.
 const CAMERA_NAME_LENGTH: usize = 80;
 
-/// Prints what is odd about a scene's file.
+/// Prints the warnings about a scene's file.
 pub(crate) fn warn_of(input: &SceneFile) {
     warn(&input.name, input.warnings());
 }
 
-/// Returns whether `path` means standard input or output.
+/// Returns whether `path` stands for standard input or output.
 pub(crate) fn is_pipe(path: &Path) -> bool {
     path.as_os_str() == OsStr::new("-")
 }
 
-/// Reads a file, mapped where possible, or standard input. A folder with `meta.json` stands for that file. Returns what messages call it, and its bytes.
+/// Reads a file, mapped if possible, or standard input. A folder with a `meta.json` stands for that file. Returns the
+/// name in messages, and the bytes.
 pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
     let limits = common.limits()?;
     if is_pipe(path) {
@@ -57,12 +58,12 @@ pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
     Ok((path.display().to_string(), Input::open_within(path, &limits)?))
 }
 
-/// The files beside the one that [`input`] calls `name`.
+/// Returns the files beside the file that [`input`] calls `name`.
 pub(crate) fn siblings(name: &str) -> Siblings<'_> {
     if name == STANDARD_INPUT { Siblings::NONE } else { Siblings::of(Path::new(name)) }
 }
 
-/// Reads a scene of any format, which its bytes tell.
+/// Reads a scene of any format. The format is recognised by content.
 pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
     let (name, bytes) = input(path, common)?;
     let options = ReadOptions::default().with_limits(common.limits()?);
@@ -95,7 +96,7 @@ pub(crate) fn open_lexi<'a>(
     }
 }
 
-/// Reads a scene of any kind, or the part of a packed file that is asked for.
+/// Reads a scene of any format, or the part of a packed file that is asked for.
 pub(crate) fn load_part(path: &Path, part: &Part, common: &Common) -> Result<SceneFile> {
     if !part.is_given() {
         return load(path, common);
@@ -105,8 +106,8 @@ pub(crate) fn load_part(path: &Path, part: &Part, common: &Common) -> Result<Sce
     Ok(SceneFile::of_lexi(&lexi, &name, bytes.len() as u64)?)
 }
 
-/// Returns the output of a command that turns the scene `input` into a file of the kind `extension`: `output` if
-/// it is given, otherwise the input's name with that extension.
+/// Returns the output of a command that converts the scene `input` to a file with `extension`: `output` if it is given,
+/// otherwise the input's name with that extension.
 pub(crate) fn output_path(
     input: &Path,
     output: Option<&Path>,
@@ -145,7 +146,7 @@ pub(crate) fn output_path(
     }
 }
 
-/// The error for an input that already is what the command makes, by its extension.
+/// Returns the error for an input that, by its extension, already has the format that the command makes.
 fn already(input: &Path, extension: &str) -> anyhow::Error {
     let name = input.display();
     let (kind, made, command) =
@@ -162,13 +163,14 @@ fn is_folder(path: &Path) -> bool {
         || path.as_os_str().as_encoded_bytes().last().is_some_and(|&b| std::path::is_separator(b.into()))
 }
 
-/// The error for the folder `path` where a file is needed, such as `file`.
+/// Returns the error for the folder `path` where a file such as `file` is needed.
 fn folder_for_file(path: &Path, file: &Path) -> anyhow::Error {
     let problem = format!("{}: the output must be a file, not a folder", path.display());
     Misuse { problem, help: format!("name a file in it, such as {}", file.display()) }.into()
 }
 
-/// The error for the folder `path` where a scene is needed. It names a scene in the folder, if there is one.
+/// Returns the error for the folder `path` where a scene is needed. The error names a scene in the folder, if there is
+/// one.
 fn folder_for_scene(path: &Path) -> anyhow::Error {
     let is_scene = |file: &PathBuf| {
         let end = file.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
@@ -178,7 +180,7 @@ fn folder_for_scene(path: &Path) -> anyhow::Error {
         let all = std::fs::read_dir(folder).into_iter().flatten().take(MOST_ENTRIES).flatten();
         all.map(|entry| entry.path())
     };
-    // Trainers leave a model for each number of rounds that they were to save.
+    // Trainers leave a model for each number of rounds at which they were told to save.
     let rounds = |model: &PathBuf| -> Option<u64> {
         model.parent()?.file_name()?.to_str()?.strip_prefix("iteration_")?.parse().ok()
     };
@@ -189,19 +191,19 @@ fn folder_for_scene(path: &Path) -> anyhow::Error {
     IsFolder { folder: path.display().to_string(), example: scene.display().to_string() }.into()
 }
 
-/// All outputs of the program, which a signal ends together.
+/// Returns the group of all outputs of the program. A signal ends them together.
 pub(crate) fn outputs() -> &'static OutputGroup {
     static OUTPUTS: LazyLock<OutputGroup> = LazyLock::new(OutputGroup::default);
     &OUTPUTS
 }
 
-/// The output `path`. An existing file is replaced if `overwrite` is set, else refused.
+/// Returns the output `path`. An existing file is replaced if `overwrite` is set, otherwise refused.
 pub(crate) fn new_output(path: &Path, overwrite: bool) -> Output<'_> {
     let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
     Output::new(path, existing).within(outputs())
 }
 
-/// Returns the one path of the file that `path` leads to, whether there is such a file yet or not.
+/// Returns the resolved path of the file that `path` leads to. The file need not exist.
 pub(crate) fn resolved(path: &Path) -> Option<PathBuf> {
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -211,14 +213,14 @@ pub(crate) fn resolved(path: &Path) -> Option<PathBuf> {
     path.canonicalize().ok().or_else(beside)
 }
 
-/// Refuses, before any work is done, an output that is in the way or that cannot be made there. `others` are the
-/// other files of the command.
+/// Returns an error, before any work is done, for an output that exists or cannot be made. `others` are the other files
+/// of the command.
 pub(crate) fn check_output(path: &Path, others: &[&Path], overwrite: bool) -> Result<()> {
     check_free(path, others, overwrite)?;
     if is_pipe(path) { Ok(()) } else { Ok(new_output(path, overwrite).check()?) }
 }
 
-/// Refuses an output that is in the way. Its folder need not exist yet.
+/// Returns an error for an output that exists and must not be replaced. The output's folder need not exist.
 pub(crate) fn check_free(path: &Path, others: &[&Path], overwrite: bool) -> Result<()> {
     let is_special = |found: std::fs::Metadata| !found.is_file() && !found.is_dir();
     if is_pipe(path) || path.metadata().is_ok_and(is_special) {
@@ -238,10 +240,10 @@ pub(crate) fn check_free(path: &Path, others: &[&Path], overwrite: bool) -> Resu
     Ok(())
 }
 
-/// Makes the folder `path` if it is not there.
+/// Makes the folder `path` if it does not exist.
 pub(crate) fn make_folder(path: &Path) -> Result<()> {
     Ok(std::fs::create_dir_all(path).map_err(|e| match e.kind() {
-        // A file has the name, which --overwrite does not help against.
+        // A file has this name. --overwrite would not help.
         ErrorKind::AlreadyExists => Error::io(path, ErrorKind::NotADirectory.into()),
         _ => Error::io(path, e),
     })?)
@@ -259,7 +261,7 @@ pub(crate) fn write_picture(path: &Path, image: &Image, overwrite: bool) -> Resu
     write_bytes(path, &png(image.width, image.height, &image.to_8bit())?, overwrite)
 }
 
-/// Lets `write` write an output: a file, or standard output. Returns what `write` does.
+/// Calls `write` with an output: a file, or standard output. Returns the result of `write`.
 pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     output: &Path,
     overwrite: bool,
@@ -278,7 +280,7 @@ pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     Ok(done)
 }
 
-/// Writes `pieces` one after another to `path` or standard output. Returns how many bytes they have.
+/// Writes `pieces` one after another to `path` or standard output. Returns the number of bytes.
 pub(crate) fn write_pieces(path: &Path, pieces: &[Cow<'_, str>], overwrite: bool) -> Result<u64> {
     let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
     if is_pipe(path) {
@@ -293,7 +295,7 @@ pub(crate) fn write_pieces(path: &Path, pieces: &[Cow<'_, str>], overwrite: bool
     Ok(bytes)
 }
 
-/// Tells what was done, as JSON or as text on standard output, or not at all.
+/// Prints the result of a command, as JSON or as text on standard output, or not at all.
 pub(crate) fn tell(
     common: &Common,
     json: impl Serialize,
@@ -308,8 +310,8 @@ pub(crate) fn tell(
     }
 }
 
-/// Returns the file name of picture number `index` of `count`, seen from `camera`. Names sort in the order of the
-/// cameras, and differ by their numbers.
+/// Returns the file name of picture number `index` of `count`, seen from `camera`. The alphabetical order of the names is
+/// the order of the cameras, and the numbers make the names unique.
 pub(crate) fn view_name(index: usize, count: usize, camera: &str) -> String {
     let digits = count.saturating_sub(1).to_string().len().max(3);
     let name = match camera.rsplit_once('.') {

@@ -1,4 +1,4 @@
-//! The page of `lexisplat html`: the built viewer with scenes put into it.
+//! The page of `lexisplat html`: the built viewer with scenes inserted.
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -9,14 +9,14 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use flate2::read::GzDecoder;
 
-/// The viewer, built by `web/build-page.mjs`, after gzip. Each of the texts below is in it once.
+/// The viewer, built by `web/build-page.mjs`, after gzip. It contains each of the texts below once.
 const VIEWER: &[u8] = include_bytes!("../assets/viewer.html.gz");
 
 const TITLE: &str = "<title>lexisplat</title>";
 const POSTER: &str = "data-poster=\"\"";
 const WORDS: &str = "data-words=\"\"";
 const CONTROLS: &str = "data-controls=\"all\"";
-/// What a page may fetch that carries no scene, and one that does.
+/// Directive of the security policy for requests: in a page without a scene, and in a page with a scene.
 const FETCHES: &str = "connect-src * blob: data:";
 const FETCHES_NOTHING: &str = "connect-src 'none'";
 const SCENES: [(&str, &str); 2] =
@@ -31,26 +31,26 @@ pub(crate) struct Poster<'a> {
     pub(crate) kind: &'static str,
 }
 
-/// What is put into the page.
+/// The contents that are inserted into the page.
 #[derive(Debug, Default)]
 pub(crate) struct Page<'a> {
     pub(crate) title: &'a str,
     pub(crate) poster: Option<Poster<'a>>,
     /// Words of a script of the viewer.
     pub(crate) words: &'a str,
-    /// Whether a page with a scene has the whole panel, not the small bar.
+    /// Whether a page with a scene has the whole panel instead of the small bar.
     pub(crate) tools: bool,
-    /// Whether the scene does not turn by itself.
+    /// Whether the scene stays still instead of turning by itself.
     pub(crate) still: bool,
     /// Names and bytes of up to two scenes.
     pub(crate) scenes: Vec<(&'a str, &'a [u8])>,
 }
 
 impl Page<'_> {
-    /// The page as HTML, in pieces that follow one another.
+    /// Returns the page as HTML, in consecutive pieces.
     ///
     /// # Errors
-    /// If the viewer in the program is damaged.
+    /// An error if the viewer in the program is damaged.
     pub(crate) fn pieces(&self) -> Result<Vec<Cow<'static, str>>> {
         let viewer = viewer()?;
         let poster = self.poster.map(|poster| {
@@ -91,7 +91,7 @@ impl Page<'_> {
     }
 }
 
-/// The viewer's page.
+/// Returns the page of the viewer.
 fn viewer() -> Result<&'static str> {
     static PAGE: OnceLock<String> = OnceLock::new();
     if let Some(page) = PAGE.get() {
@@ -102,7 +102,7 @@ fn viewer() -> Result<&'static str> {
     Ok(PAGE.get_or_init(|| page))
 }
 
-/// `text` where HTML expects text or the value of an attribute in double quotes.
+/// Returns `text` escaped for HTML text and for attribute values in double quotes.
 fn escaped(text: &str) -> String {
     text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
         match c {

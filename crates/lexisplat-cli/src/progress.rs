@@ -1,4 +1,4 @@
-//! Progress on standard error: on a terminal a bar that moves as long as the command works, otherwise a line every
+//! Progress on standard error. On a terminal a bar moves as long as the command works. Otherwise a line is printed every
 //! ten seconds.
 
 use std::io::IsTerminal;
@@ -11,33 +11,33 @@ use lexisplat_eval::format;
 
 use crate::terminal::note;
 
-/// A command shorter than this shows no bar.
+/// Duration of the longest command without a bar.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Time between two pictures of the bar.
+/// Time between two updates of the bar.
 const TICK: Duration = Duration::from_millis(100);
-/// Time between two lines where standard error is no terminal.
+/// Time between two lines if standard error is not a terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
 /// Width of a bar, in characters.
 const WIDTH: usize = 24;
-/// Width of the block that moves where nothing is counted, in characters.
+/// Width of the moving block for work that is not counted, in characters.
 const BLOCK: usize = 4;
 const FULL: &str = "█";
 const EMPTY: &str = "░";
-/// Shortest time from which a rate is taken. The first units of a step may be quicker than the others.
+/// Shortest time from which a rate is computed. The first units of a step may be faster than the others.
 const LEAST_TIMED: Duration = Duration::from_millis(500);
 
-/// What the command is doing.
+/// The current work of the command.
 static WORK: Mutex<Work> = Mutex::new(Work { outer: None, step: None });
-/// The bar of the command. It is never used while [`WORK`] is locked: the thread that draws it locks them in the
-/// other order.
+/// The bar of the command. It must never be locked while [`WORK`] is locked, because the thread that draws the bar locks
+/// them in the other order.
 static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
-/// Locks `mutex`. A thread that panicked while it held the lock leaves at worst a wrong line on the screen.
+/// Locks `mutex`. After a panic of a thread that held the lock, at worst a wrong line is on the screen.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a command is doing: a step, which may be within one of several larger parts.
+/// The current work of a command: a step, which may be part of larger work with several parts.
 #[derive(Debug)]
 struct Work {
     outer: Option<Step>,
@@ -61,7 +61,7 @@ impl Step {
         Self { label, unit: unit.to_owned(), total, done: 0, start: Instant::now() }
     }
 
-    /// What is being done, and how much of it is done.
+    /// Returns the work and how much of it is done, as text.
     fn text(&self) -> String {
         let (label, unit) = (&self.label, &self.unit);
         let done = format::count(self.done);
@@ -71,7 +71,7 @@ impl Step {
         }
     }
 
-    /// The time that the rest takes if it goes on as it went for `elapsed`.
+    /// Returns the time for the remaining units, at the mean rate during `elapsed`.
     fn left(&self, elapsed: Duration) -> Option<Duration> {
         let rest = self.total.checked_sub(self.done).filter(|_| self.total > 0)?;
         if self.done == 0 || elapsed < LEAST_TIMED {
@@ -80,20 +80,21 @@ impl Step {
         Duration::try_from_secs_f64(elapsed.as_secs_f64() * rest as f64 / self.done as f64).ok()
     }
 
-    /// The share that is done, if that can be told.
+    /// Returns the share that is done, if it is known.
     fn share(&self) -> Option<f64> {
         (self.total > 0).then(|| (self.done as f64 / self.total as f64).min(1.0))
     }
 }
 
 impl Work {
-    /// What is being done, and how much of it is done.
+    /// Returns the work and how much of it is done, as text.
     fn text(&self) -> String {
         let steps: Vec<String> = self.outer.iter().chain(&self.step).map(Step::text).collect();
         if steps.is_empty() { "working".to_owned() } else { steps.join("; ") }
     }
 
-    /// The line on a terminal `now`, when the command has worked since `start`: a bar, what is done, and the time left.
+    /// Returns the line on a terminal at the time `now`, for a command that started at `start`: a bar, the work that is
+    /// done, and the time left.
     fn line(&self, start: Instant, now: Instant) -> String {
         let main = self.outer.as_ref().or(self.step.as_ref());
         let since = |from: Instant| now.saturating_duration_since(from);
@@ -112,14 +113,14 @@ impl Work {
     }
 }
 
-/// A bar of which `share` is full.
+/// Returns a bar that is filled to `share`.
 fn filled(share: f64) -> String {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the width")]
     let full = (share.clamp(0.0, 1.0) * WIDTH as f64) as usize;
     format!("{}{}", FULL.repeat(full), EMPTY.repeat(WIDTH - full))
 }
 
-/// A bar with a block that moves to and fro.
+/// Returns a bar with a block that moves to and fro.
 fn moving(elapsed: Duration) -> String {
     let places = WIDTH - BLOCK;
     let step = usize::try_from(elapsed.as_millis() / TICK.as_millis()).unwrap_or(0) % (2 * places);
@@ -127,7 +128,7 @@ fn moving(elapsed: Duration) -> String {
     format!("{}{}{}", EMPTY.repeat(at), FULL.repeat(BLOCK), EMPTY.repeat(places - at))
 }
 
-/// A time in whole seconds, or in minutes and hours.
+/// Returns a time in whole seconds, or in minutes and hours, as text.
 fn seconds(time: Duration) -> String {
     let all = time.as_secs();
     match (all / 3600, all / 60 % 60, all % 60) {
@@ -137,7 +138,7 @@ fn seconds(time: Duration) -> String {
     }
 }
 
-/// Shows from now on what the command does: on a terminal as a bar, otherwise as a line every ten seconds.
+/// Starts to show the work of the command: on a terminal as a bar, otherwise as a line every ten seconds.
 pub(crate) fn show() {
     let start = Instant::now();
     let terminal = std::io::stderr().is_terminal();
@@ -148,7 +149,7 @@ pub(crate) fn show() {
     if terminal {
         *lock(&BAR) = Some(bar.clone());
     }
-    // Without the thread nothing is shown, and everything else is as usual. The thread ends with the program.
+    // If the thread cannot be started, nothing is shown, and everything else works. The thread ends with the program.
     let _ = std::thread::Builder::new().name("progress".to_owned()).spawn(move || {
         if !terminal {
             loop {
@@ -168,14 +169,14 @@ pub(crate) fn show() {
     });
 }
 
-/// Takes the bar off the screen for good.
+/// Removes the bar from the screen for good.
 pub(crate) fn clear() {
     if let Some(bar) = lock(&BAR).take() {
         bar.finish_and_clear();
     }
 }
 
-/// Prints with `print` while the bar is off the screen.
+/// Calls `print` while the bar is off the screen.
 pub(crate) fn without_bar<T>(print: impl FnOnce() -> T) -> T {
     let bar = lock(&BAR).clone();
     match bar {
@@ -184,7 +185,7 @@ pub(crate) fn without_bar<T>(print: impl FnOnce() -> T) -> T {
     }
 }
 
-/// Reports the steps of a command, unless it was asked to be quiet.
+/// Reports the steps of a command, unless the command is quiet.
 #[derive(Debug)]
 pub(crate) struct Bars {
     quiet: bool,
@@ -195,14 +196,14 @@ impl Bars {
         Self { quiet }
     }
 
-    /// Starts a step of `total` units called `unit`; 0 if their number is not known.
+    /// Starts a step of `total` units called `unit`; 0 if the number is not known.
     pub(crate) fn start(&self, label: &str, unit: &str, total: u64) {
         if !self.quiet {
             lock(&WORK).step = Some(Step::new(label, unit, total));
         }
     }
 
-    /// Starts `total` parts called `unit`, within which steps follow.
+    /// Starts `total` parts called `unit`. Steps follow within each part.
     pub(crate) fn start_parts(&self, label: &str, unit: &str, total: u64) {
         if !self.quiet {
             *lock(&WORK) = Work { outer: Some(Step::new(label, unit, total)), step: None };
@@ -216,7 +217,7 @@ impl Bars {
         }
     }
 
-    /// One more part is done.
+    /// Reports that one more part is done.
     pub(crate) fn part_done(&self) {
         let mut work = lock(&WORK);
         work.step = None;
@@ -225,7 +226,7 @@ impl Bars {
         }
     }
 
-    /// All parts are over.
+    /// Reports the end of all parts.
     pub(crate) fn end_parts(&self) {
         *lock(&WORK) = Work { outer: None, step: None };
     }

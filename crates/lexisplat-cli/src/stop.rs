@@ -1,5 +1,5 @@
-//! Ends the program when Ctrl-C or another signal asks for it: removes unfinished outputs, prints one line, and
-//! ends by that signal.
+//! Ends the program when Ctrl-C or another signal asks for it. It removes unfinished outputs, prints one line, and ends
+//! by that signal.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -7,15 +7,15 @@ use crate::files::outputs;
 use crate::progress;
 use crate::terminal::note;
 
-/// What a command writes. The line that is printed after a signal depends on it.
+/// The outputs that a command is writing. The line that is printed after a signal depends on them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Work {
     /// No output.
     Nothing,
-    /// This number of files. Once all of them are whole the program ignores the signal, and ends by itself.
-    /// `usize::MAX` if it must never ignore it.
+    /// This number of files. Once all of them are whole, the program ignores the signal and ends by itself. `usize::MAX`
+    /// means that the signal is never ignored.
     Files(usize),
-    /// Files that a second run of the same command continues from.
+    /// Files from which a second run of the same command continues.
     Resumable,
     /// Standard output.
     Stream,
@@ -23,12 +23,12 @@ pub(crate) enum Work {
 
 static WORK: Mutex<Work> = Mutex::new(Work::Nothing);
 
-/// Sets what the command writes from here on.
+/// Sets the outputs that the command writes from now on.
 pub(crate) fn while_writing(work: Work) {
     *WORK.lock().unwrap_or_else(PoisonError::into_inner) = work;
 }
 
-/// Blocks if a signal is ending the program, so that its thread alone prints and chooses the exit code.
+/// Blocks if a signal is ending the program, so that only the signal's thread prints and chooses the exit code.
 pub(crate) fn wait_if_stopped() {
     while outputs().is_stopped() {
         std::thread::park();
@@ -69,12 +69,12 @@ mod unix {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
     use signal_hook::{flag, iterator::Signals, low_level};
 
-    /// A shell adds this to the number of a signal to make an exit code (POSIX).
+    /// Number that a shell adds to the number of a signal to make an exit code (POSIX).
     const SHELL: c_int = 128;
 
-    /// Starts to watch for signals. If that fails, signals end the program at once, as they do by default.
+    /// Starts to watch for signals. If this fails, signals end the program at once, which is the default.
     ///
-    /// SIGHUP stays ignored if it was ignored at the start, because `nohup` asks for that. SIGINT does not:
+    /// SIGHUP stays ignored if it was ignored at the start, because `nohup` asks for that. SIGINT does not stay ignored:
     /// shells ignore it for the background jobs of a script, and such a job would outlive its script.
     pub(crate) fn listen() {
         let mut signals = vec![SIGINT, SIGTERM];
@@ -87,10 +87,10 @@ mod unix {
     }
 
     fn watch(signals: &[c_int]) -> std::io::Result<()> {
-        // The second signal ends the program at once. The handler that ends it is registered before the one that
-        // sets the flag, so that the first signal does not find the flag set.
+        // The second signal ends the program at once. The handler that ends it is registered before the handler that sets
+        // the flag, so that the first signal does not find the flag set.
         let once = Arc::new(AtomicBool::new(false));
-        // First of all, or a signal between would set the flag and do nothing else.
+        // The watcher is registered first. Otherwise a signal in between would only set the flag.
         let mut watched = Signals::new(signals)?;
         for &signal in signals {
             flag::register_conditional_default(signal, Arc::clone(&once))?;
@@ -114,8 +114,8 @@ mod unix {
         }
     }
 
-    /// Ends the program as the signal does by default, so that the caller sees the signal: a shell then also ends
-    /// the loop that the program ran in.
+    /// Ends the program by the default action of the signal, so that the caller sees the signal. A shell then also ends
+    /// the loop in which the program ran.
     fn end(signal: c_int) {
         // The kernel does not end the first process of a container by a signal.
         if std::process::id() != 1 {
@@ -124,7 +124,7 @@ mod unix {
         low_level::exit(SHELL + signal);
     }
 
-    /// Returns whether `signal` was ignored when the program started; `false` where there is no `/proc`.
+    /// Returns whether `signal` was ignored when the program started; `false` if there is no `/proc`.
     fn is_ignored(signal: c_int) -> bool {
         let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -1,4 +1,4 @@
-//! What the program prints: results on standard output, notes on standard error.
+//! The output of the program: results on standard output, notes on standard error.
 //!
 //! Everything goes through [`format::escape`], because names and comments from files may hold control characters.
 
@@ -12,12 +12,12 @@ use serde_json::Value;
 
 use crate::progress::without_bar;
 
-/// What messages call standard output.
+/// Name of standard output in messages.
 pub(crate) const STANDARD_OUTPUT: &str = "standard output";
-/// Version of the objects that [`print_json`] prints. A member that changes its meaning or goes raises it.
+/// Version of the objects that [`print_json`] prints. It rises when a member is removed or changes its meaning.
 const SCHEMA_VERSION: u32 = 1;
 
-/// Prints a line to standard error. A program whose standard error is full goes on.
+/// Prints a line to standard error. If standard error is full, the program continues.
 pub(crate) fn note(line: &str) {
     let line = format::escape(line);
     without_bar(|| {
@@ -37,7 +37,7 @@ pub(crate) fn print(text: &str) -> Result<()> {
     print_unescaped(&format::escape_lines(text))
 }
 
-/// Prints text of which nothing comes from a file.
+/// Prints text that contains nothing from a file.
 pub(crate) fn print_unescaped(text: &str) -> Result<()> {
     let write = || {
         let mut out = std::io::stdout().lock();

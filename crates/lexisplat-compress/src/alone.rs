@@ -1,7 +1,8 @@
-//! Fits a first layer to what the whole scene shows, for the time while the second is not there.
+//! Fits the first layer of a file to the pictures of the whole scene, for the time until the second layer has arrived.
 //!
-//! Pictures are linear in colours, and nearly so in small changes of opacities and sizes. Files hold opacities and scales in
-//! large steps, so what is solved with them is solved again when they are rounded (docs/METHOD.md, "Layers").
+//! Pictures are linear in colours, and nearly linear in small changes of opacities and sizes. Files hold opacities and
+//! scales in large steps. Colours are therefore solved for last, with opacities and scales rounded as in the file
+//! (docs/METHOD.md, "Layers").
 
 use lexisplat::packed::AppearanceChange;
 use lexisplat::sh::C0;
@@ -12,23 +13,25 @@ use crate::error::Result;
 use crate::only_cancels::OneStep;
 use crate::solve::{ROW, kinds, solve};
 
-/// Solutions: of sizes, of opacities and of colours.
+/// Number of solutions: for sizes, for opacities and for colours.
 const SOLUTIONS: usize = 3;
-/// One of this many views is fitted to. With a quarter of them a first layer alone is 0.7 dB worse (bonsai-3dgs, room).
+/// The first layer is fitted to every `VIEW_SHARE`-th view. With every fourth view its pictures are 0.7 dB worse
+/// (bonsai-3dgs, room).
 const VIEW_SHARE: usize = 2;
-/// Steps of the method of conjugate gradients, of each of them.
+/// Number of conjugate-gradient steps of each solution.
 const STEPS: usize = 3;
-/// The ridge, as a share of sums of rows and of the diagonal, and of their means.
+/// The ridge of a value is `RIDGE * (own + RIDGE_MEAN * mean)`: `own` is half of the sum of the value's row for colours,
+/// and its diagonal entry for opacities and sizes. `mean` is the mean of `own` over all Gaussians, without the half.
 const RIDGE: f32 = 0.1;
 const RIDGE_MEAN: f32 = 0.1;
-/// Multiple of the diagonal of the matrix in the preconditioner of opacities and sizes.
+/// Factor on the diagonal of the matrix in the preconditioner of opacities and sizes.
 const DIAGONAL: f32 = 2.0;
-/// Largest changes of the logarithms of an opacity and of scales.
+/// Largest changes of the logarithms of opacities and of scales.
 const MOST_LOG_OPACITY: f32 = 1.0;
 const MOST_LOG_SCALE: f32 = 0.8;
 
-/// Changes with which pictures of `splats`, a first layer alone, are nearest to `targets`, one for each of `cameras`. Reports
-/// [`Stage::Draw`], in views, to `progress`.
+/// Returns the changes of the Gaussians of `splats`, the first layer of a file, with which its pictures are nearest to
+/// `targets`. There is one target for each of `cameras`. Reports [`Stage::Draw`] to `progress`, in views.
 ///
 /// # Errors
 /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -38,7 +41,7 @@ pub(crate) fn alone(
     targets: &[Image],
     progress: &dyn Progress,
 ) -> Result<Vec<AppearanceChange>> {
-    // A first layer alone has no finer detail, and is fitted in a quarter of the time.
+    // The first layer alone has no finer detail, and is fitted in a quarter of the time.
     let shrink = |(target, camera): (&Image, &Camera)| {
         let smaller = camera.halved();
         (shrunk(target, camera, &smaller), smaller)
@@ -73,7 +76,8 @@ pub(crate) fn alone(
     Ok(changes)
 }
 
-/// Changes with which pictures of `splats`, a first layer alone, are nearest to the targets, if pictures are linear in them.
+/// Returns the changes with which pictures of `splats`, the first layer of a file, are nearest to the targets, if pictures
+/// are linear in the changes.
 fn nearest<const N: usize>(
     splats: &Splats,
     cameras: &[Camera],
@@ -96,7 +100,8 @@ fn nearest<const N: usize>(
     solve(&mut adjoint, errors, &ridge, &diagonal, STEPS, progress)
 }
 
-/// `image`, which `camera` draws, as `smaller` would. Each pixel is the mean of the drawn pixels that it covers.
+/// Returns `image`, a picture from `camera`, at the size of `smaller`. Each pixel is the mean of the drawn pixels that it
+/// covers.
 fn shrunk(image: &Image, camera: &Camera, smaller: &Camera) -> Image {
     let covered = |k: usize, of: u32, from: u32| {
         let place = |k: usize| (k * from as usize).div_ceil(of.max(1) as usize);

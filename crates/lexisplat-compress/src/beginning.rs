@@ -1,4 +1,4 @@
-//! The front door: one call that does what the program does.
+//! The shortest way to compress: one call that does what the program does.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use crate::views::read_beside;
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Source<'a> {
-    /// A scene file of any format that is read, or its folder.
+    /// A scene file of any format that can be read, or the folder of such a file.
     File(PathBuf),
     /// A scene that is open or in memory.
     Open(&'a dyn SplatSource),
@@ -65,8 +65,9 @@ impl<'a> From<&'a dyn SplatSource> for Source<'a> {
     }
 }
 
-/// Begins to compress `source`: a path, or splats. [`Compress::write`] ends it. Without other choices the quality is that of
-/// [`Preset::Balanced`], judged by the cameras that lie beside a file, or by views like photographs that are found.
+/// Begins to compress `source`, a path or splats. [`Compress::write`] and [`Compress::to_bytes`] run the compression.
+/// Without other choices the quality is [`Preset::Balanced`]. It is judged by cameras that lie beside the file and seem to
+/// belong to the scene, or else by views like photographs, which a search finds.
 ///
 /// ```
 /// use lexisplat_sample::{SampleOptions, scene};
@@ -88,7 +89,7 @@ pub fn compress<'a>(source: impl Into<Source<'a>>) -> Compress<'a> {
     }
 }
 
-/// A scene to compress, and how. [`compress`] makes it.
+/// A scene to compress and the choices for it. [`compress`] makes it.
 #[derive(Clone)]
 #[must_use = "`write` or `to_bytes` compresses"]
 pub struct Compress<'a> {
@@ -109,22 +110,22 @@ impl fmt::Debug for Compress<'_> {
 }
 
 impl<'a> Compress<'a> {
-    /// A quality by name.
+    /// Sets the quality by name.
     pub fn preset(self, preset: Preset) -> Self {
         self.quality(preset)
     }
 
-    /// A mean PSNR over views of the scene, in dB.
+    /// Sets the quality as a mean PSNR over views of the scene, in dB.
     pub fn psnr(self, decibels: f64) -> Self {
         self.quality(Target::MeanPsnr(decibels))
     }
 
-    /// Any quality or size: a [`Preset`] or a [`Target`].
+    /// Sets any quality or size: a [`Preset`] or a [`Target`].
     pub fn quality(self, quality: impl Into<Quality>) -> Self {
         Self { quality: quality.into(), ..self }
     }
 
-    /// Measures and judges by these cameras, in the world of the scene, and not by those that lie beside it.
+    /// Measures and judges by these cameras, in the world of the scene, instead of by cameras that lie beside it.
     pub fn cameras(self, cameras: Vec<Camera>) -> Self {
         Self { cameras: Some(cameras), ..self }
     }
@@ -134,7 +135,7 @@ impl<'a> Compress<'a> {
         Self { beside: false, ..self }
     }
 
-    /// Reads the file with these options: its limits, and what to do with values that are not finite.
+    /// Reads the file with these options: its limits, and the treatment of values that are not finite.
     pub fn read_options(self, read: ReadOptions) -> Self {
         Self { read, ..self }
     }
@@ -144,7 +145,7 @@ impl<'a> Compress<'a> {
         Self { gpu: Some(gpu), ..self }
     }
 
-    /// Tells `progress` of every step. It may cancel.
+    /// Reports every step to `progress`, which can cancel.
     pub fn progress(self, progress: &'a dyn Progress) -> Self {
         Self { progress, ..self }
     }
@@ -152,12 +153,12 @@ impl<'a> Compress<'a> {
     /// Compresses into the file `path`, which appears when it is whole.
     ///
     /// # Errors
-    /// As [`Compression::run`], and those of reading the file.
+    /// Errors of [`Compression::run`] and of reading the file.
     pub fn write(&self, path: impl AsRef<Path>) -> Result<CompressionReport> {
         self.run(path.as_ref().into())
     }
 
-    /// Compresses into memory. Returns the bytes of the file too.
+    /// Compresses into memory. Returns the bytes of the file and the report.
     ///
     /// # Errors
     /// As [`Self::write`].

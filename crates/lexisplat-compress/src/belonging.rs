@@ -1,4 +1,4 @@
-//! Whether cameras that were found belong to a scene.
+//! Decides whether cameras that were found belong to a scene.
 
 use lexisplat::{Progress, Splats};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_views};
@@ -7,15 +7,18 @@ use crate::error::Result;
 use crate::found::{detail, sketch};
 use crate::signs::shows_almost_nothing;
 
-/// Views that are drawn, at most: of the cameras, and natural ones beside them. The largest width of their pictures, in pixels.
+/// Largest number of views drawn from the cameras, and the same number from natural views. Below: the largest width of
+/// their pictures, in pixels.
 const DRAWN: usize = 12;
 const DRAWN_WIDTH: u32 = 96;
-/// Pictures with less than so many times the detail of natural views are not like photographs. Six scenes' own cameras have 1.36
-/// to 3.7 times, and 0.35 and 0.97 in another scene.
+/// Least ratio of the detail of the cameras' pictures to that of natural views. Pictures of a lower ratio are not like
+/// photographs. The ratio is 1.36 to 3.7 with the own cameras of six scenes, and 0.35 and 0.97 with cameras of another
+/// scene.
 const LEAST_DETAIL: f64 = 1.15;
 
-/// Whether photographs of `splats` may have been taken by `cameras`. Most of them show something of it, and about as much detail
-/// as [`natural_views`]. Cameras of another scene, or in other coordinates, fail.
+/// Returns whether photographs of `splats` may have been taken by `cameras`. The pictures of most cameras must show
+/// something of the scene. Their median detail must be at least [`LEAST_DETAIL`] times that of [`natural_views`]. Cameras
+/// of another scene, or in other coordinates, fail.
 ///
 /// # Errors
 /// As [`Renderer::render`]; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].

@@ -1,36 +1,36 @@
-//! Pictures of a scene that are scored.
+//! Drawing of the pictures that are scored.
 
 use lexisplat::{Progress, ShDegree, Stage};
 use lexisplat_render::{Camera, Image, Prepared, RenderOptions, Renderer, Scene};
 
 use crate::error::Result;
 
-/// How to draw pictures that are scored. The default is black behind the scene, and no rounding.
+/// Options of drawing the pictures that are scored. By default the background is black and values are not rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct DrawOptions {
-    /// Colour behind the scene, 0 to 1 a channel.
+    /// Colour behind the scene, each channel from 0 to 1.
     pub background: [f32; 3],
-    /// Whether pictures are rounded to 8 bits, as when they are saved and read back.
+    /// Whether pictures are rounded to 8 bits, as in saved pictures.
     pub eight_bit: bool,
-    /// Highest SH degree to draw with; `None` draws all that a scene has.
+    /// Highest SH degree to draw; `None` draws all degrees of the scene.
     pub max_degree: Option<ShDegree>,
 }
 
 impl DrawOptions {
-    /// Options with the given background and rounding.
+    /// Returns options with this background and rounding.
     #[must_use]
     pub fn new(background: [f32; 3], eight_bit: bool) -> Self {
         Self { background, eight_bit, max_degree: None }
     }
 
-    /// These options with another highest SH degree.
+    /// Returns these options with another highest SH degree.
     #[must_use]
     pub fn with_max_degree(self, max_degree: Option<ShDegree>) -> Self {
         Self { max_degree, ..self }
     }
 
-    /// Draws a view of `scene`, which `renderer` prepared.
+    /// Draws the view of `scene` from `camera`. `renderer` must have prepared the scene.
     ///
     /// # Errors
     /// [`crate::Error::Render`] as [`Renderer::render`].
@@ -45,7 +45,7 @@ impl DrawOptions {
     }
 }
 
-/// Draws `scene` as every camera sees it. Reports [`Stage::Draw`] to `progress`, in views.
+/// Draws `scene` from every camera. Reports [`Stage::Draw`] to `progress`, in views.
 ///
 /// # Errors
 /// [`crate::Error::Render`] as [`Renderer::prepare`] and [`Renderer::render`]. [`crate::Error::Codec`] if

@@ -1,4 +1,4 @@
-//! What can go wrong, split by who is to blame.
+//! Errors, split by who is to blame.
 
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -12,10 +12,10 @@ pub enum Error {
     Io {
         /// The file, as the caller named it.
         file: String,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// The bytes are not what they claim to be. The file is at fault.
+    /// The bytes are not of the format that they claim. The file is at fault.
     #[error("{file}: {problem}")]
     Format {
         /// The file, as the caller named it.
@@ -23,14 +23,14 @@ pub enum Error {
         /// What is wrong with it.
         problem: String,
     },
-    /// More than a limit allows.
+    /// A size is over a limit.
     #[error("{what}: {found} is over the limit of {limit}")]
     Limit {
-        /// What there is too much of.
+        /// The thing of which there is too much.
         what: String,
-        /// How much there is.
+        /// The size found.
         found: u64,
-        /// The most allowed.
+        /// The largest size allowed.
         limit: u64,
     },
     /// An argument is out of range. The caller is at fault.
@@ -40,11 +40,11 @@ pub enum Error {
         name: &'static str,
         /// The value given.
         value: String,
-        /// What would have been accepted.
+        /// The values that would have been accepted.
         expected: String,
     },
-    /// A choice needs the whole scene in memory, and memory does not allow it. Allow more, or choose a preset or a mean PSNR,
-    /// which needs only parts.
+    /// A choice needs the whole scene in memory, and the memory allowed is too small for it. Allow more memory, or choose a
+    /// preset or a mean PSNR, with which a scene can be packed in parts.
     #[error("memory = {allowed}: at least {needed} bytes, because {choice} needs the whole scene at once")]
     Memory {
         /// The choice that needs the whole scene.
@@ -73,17 +73,17 @@ impl From<lexisplat_render::Error> for Error {
 }
 
 impl Error {
-    /// An [`Error::Io`] about `file`.
+    /// Returns an [`Error::Io`] about `file`.
     pub fn io(file: impl AsRef<std::path::Path>, source: std::io::Error) -> Self {
         Self::Io { file: file.as_ref().display().to_string(), source }
     }
 
-    /// An [`Error::Format`] about `file`.
+    /// Returns an [`Error::Format`] about `file`.
     pub fn format(file: impl AsRef<std::path::Path>, problem: impl Into<String>) -> Self {
         Self::Format { file: file.as_ref().display().to_string(), problem: problem.into() }
     }
 
-    /// An [`Error::Parameter`].
+    /// Returns an [`Error::Parameter`].
     pub fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
         Self::Parameter { name, value: value.to_string(), expected: expected.into() }
     }

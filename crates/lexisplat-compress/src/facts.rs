@@ -1,10 +1,10 @@
-//! Facts about a .lexi file, as reports give them.
+//! Facts about a .lexi file, in the form of reports.
 
 use lexisplat::packed::StreamBits;
 use lexisplat::{Pursuit, Record};
 use serde::Serialize;
 
-/// How a .lexi file was made, and its errors, to serialize. docs/FORMAT.md has the meaning of the keys.
+/// The record of how a .lexi file was made and of its errors, to serialise. docs/FORMAT.md explains the keys.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[allow(missing_docs, reason = "the fields are those of a record, by their keys in reports")]
 #[non_exhaustive]
@@ -33,13 +33,14 @@ impl From<&Record> for RecordReport {
     }
 }
 
-/// A number of bytes to serialize: an integer if it is whole. Streams of a packed file share bytes.
+/// A number of bytes, serialised as an integer if it is whole. It need not be whole, because the streams of a packed file
+/// share bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum ByteCount {
-    /// Whole bytes.
+    /// A whole number of bytes.
     Whole(u64),
-    /// Bytes and a part of one.
+    /// A number of bytes with a fraction.
     Part(f64),
 }
 
@@ -50,11 +51,11 @@ impl From<f64> for ByteCount {
     }
 }
 
-/// Returns the bytes of each part of a file by name. Their sum is the file's size.
+/// Returns the bytes of each part of a file, by name. Their sum is the size of the file.
 ///
-/// `tensors` are the bytes of each tensor and of the header. For a packed file `streams` are the bits of each
-/// stream in the tensor `packed.data`: they are summed by attribute, and `rounding` is what the tensor has
-/// beyond them, since streams end in whole words.
+/// `tensors` are the bytes of each tensor and of the header. For a packed file `streams` are the bits of each stream in the
+/// tensor `packed.data`. Streams are summed by attribute. Streams end in whole words, so the tensor has more bytes than the
+/// streams have bits: the part `rounding` is that difference.
 #[must_use]
 pub fn part_bytes(tensors: &[(String, u64)], streams: &[StreamBits]) -> Vec<(String, f64)> {
     let mut out: Vec<(String, f64)> = Vec::new();
@@ -76,7 +77,7 @@ pub fn part_bytes(tensors: &[(String, u64)], streams: &[StreamBits]) -> Vec<(Str
     out
 }
 
-/// Returns the bytes of those `parts` that stand for SH-rest: dictionary, codes and escapes.
+/// Returns the sum of the bytes of the `parts` that hold SH-rest: the dictionary, codes and escapes.
 #[must_use]
 pub fn sh_bytes(parts: &[(String, f64)]) -> f64 {
     let is_sh =

@@ -1,4 +1,4 @@
-//! Leaves out Gaussians until there are few enough.
+//! Removes Gaussians until their number is at most a limit.
 
 use lexisplat::{Progress, Sensitivity, Splats, Stage};
 use lexisplat_render::{Renderer, Scene};
@@ -8,12 +8,13 @@ use crate::only_cancels::OnlyCancels;
 use crate::packing_views::PackingViews;
 use crate::refit::Fit;
 
-/// Largest share of the Gaussians that goes before it is measured again what each of the others shows. It shows more once
-/// its neighbours are gone (docs/METHOD.md, "At most so many").
+/// Largest share of the Gaussians to remove before the sensitivity is measured again. A Gaussian shows more once its
+/// neighbours are gone (docs/METHOD.md, "At most so many").
 const SHARE: f64 = 0.25;
 
-/// The Gaussians of `splats` that show most, at most `most`, and what they show in `views`. Their base colours and
-/// opacities are fitted to what `fit` holds of all. `sensitivity` is that of `splats`.
+/// Returns at most `most` Gaussians of `splats`, those that show most, and their sensitivity in `views`. Their base colours
+/// and opacities are fitted to the targets of `fit`, which are pictures of all Gaussians. `sensitivity` is the sensitivity
+/// of `splats`.
 ///
 /// # Errors
 /// As [`PackingViews::sensitivity`].
@@ -45,7 +46,8 @@ pub(crate) fn at_most(
     Ok((splats, sensitivity))
 }
 
-/// Marks all but the `count` smallest of `changes`. Of equal ones the last go first.
+/// Returns a mark for each of `changes`: false for the `count` smallest, true for the others. Of equal changes the last are
+/// marked false first.
 fn all_but(count: usize, changes: &[f32]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..changes.len()).collect();
     order.sort_by(|&a, &b| changes[a].total_cmp(&changes[b]).then(b.cmp(&a)));

@@ -1,8 +1,8 @@
 //! Finds views of a scene that are like photographs of it.
 //!
-//! Photographs show more detail than nearly all views from random places: they are taken of what has detail, through
-//! clear space, and training put detail where they looked. So many small pictures are drawn, and those with the most
-//! detail win.
+//! Photographs show more detail than nearly all views from random places. They are taken of things with detail, through
+//! clear space, and training puts detail where photographs look. The search therefore draws many small pictures and chooses
+//! the views with the most detail.
 
 use lexisplat::packed::curve_order;
 use lexisplat::{Progress, ShDegree, Splats, Stage};
@@ -15,41 +15,44 @@ use crate::packing_views::GENERATED_SIZE as SIZE;
 use crate::photo_views::{likelihood, turned};
 use crate::size_spread::{Sizes, SizesSeen};
 
-/// Number of natural views that are tried. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have fewer.
+/// Number of natural views that are tried: [`GAUSSIANS_DRAWN`] over the number of Gaussians, within this range.
 const TRIED: std::ops::RangeInclusive<usize> = 320..=640;
-/// Natural views made for each that is tried.
+/// Number of natural views generated for each one that is tried.
 const CHOICE: usize = 4;
-/// One of this many tried views is from where photographs were likely taken. The others cover the rest of the scene.
+/// The number of tried views over the number of those from likely places of photographs. The other tried views cover the
+/// rest of the scene.
 const PHOTO_SHARE: usize = 2;
-/// Gaussians drawn in all tried views together, about.
+/// Approximate number of Gaussians drawn in all tried views together.
 const GAUSSIANS_DRAWN: usize = 128_000_000;
 /// Width and height of the small pictures, in pixels.
 const SMALL: [u32; 2] = [96, 64];
-/// Gaussians of less opacity than this, 5 %, before the sigmoid, are not in the small pictures.
+/// Smallest opacity in the small pictures, 5 %, before the sigmoid.
 const FAINT: f32 = -3.0;
-/// A pixel shows something if a channel is above this.
+/// A pixel shows something if one of its channels is above this value.
 const LIT: f32 = 0.02;
-/// A view with less than this share of the median of lit pixels looks past the scene.
+/// Least share of lit pixels in a view that looks at the scene, as a multiple of the median share. Views with less look
+/// past the scene.
 const LEAST_LIT: f64 = 0.9;
-/// If the median of lit pixels is below this share, the scene is an object before nothing. Pictures of such an object
-/// show all of it. The median is 0.9 to 1 for six captures with a background, and 0.45 for lego.
+/// Least median share of lit pixels in a scene with a background. With a lower median the scene is an object before
+/// nothing, and pictures of such an object show all of it. The median is 0.9 to 1 for six captures with a background, and
+/// 0.45 for lego.
 const BARE: f64 = 0.7;
 
-/// Views that are like photographs, those with most detail first.
+/// Views like photographs, in descending order of detail.
 #[derive(Debug)]
 pub(crate) struct Found {
-    /// Views to measure by.
+    /// Views for measuring.
     pub(crate) best: Vec<Camera>,
-    /// Views to judge by. None of them measures.
+    /// Views for judging. None of them is in `best`.
     pub(crate) judges: Vec<Camera>,
 }
 
-/// Finds as many views to measure and to judge by as `counts` says, or fewer in a scene of few Gaussians, among `more`
-/// and natural ones. Reports [`Stage::Draw`], in views, to `progress`, which can cancel.
+/// Finds `measuring` views and `judging` views, or fewer in a scene of few Gaussians, among natural views and `more`.
+/// Reports [`Stage::Draw`] to `progress`, in views. `progress` can cancel.
 ///
 /// # Errors
-/// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene or a
-/// view does not fit.
+/// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene or a view
+/// does not fit.
 pub(crate) fn find(
     renderer: &mut Renderer,
     splats: &Splats,
@@ -73,11 +76,11 @@ pub(crate) fn find(
             of_kind.push((detail(&picture), lit(&picture), camera));
             progress.advance(1);
         }
-        // The sort is stable, so that equal views stay in their order.
+        // The sort is stable: views of equal detail keep their order.
         of_kind.sort_by(|a, b| b.0.total_cmp(&a.0));
         let count = of_kind.len() as f64;
         let ranked = of_kind.into_iter().enumerate();
-        // Views through clutter have the most detail, so each kind is ranked on its own.
+        // Views through clutter have the most detail, so views from likely places and other views are ranked apart.
         seen.extend(ranked.map(|(place, (_, lit, camera))| Seen {
             rank: (place as f64 + 0.5) / count,
             may_judge: place.is_multiple_of(2),
@@ -92,7 +95,7 @@ pub(crate) fn find(
     let clear = |view: &Seen| view.lit >= LEAST_LIT * median;
     // Views past the scene come last.
     seen.sort_by(|a, b| clear(b).cmp(&clear(a)).then(a.rank.total_cmp(&b.rank)));
-    // The best of each kind take turns to judge and to measure, as long as judges are needed.
+    // The best views of each kind are used for judging and for measuring in turn, until there are enough for judging.
     let (mut best, mut judges) = (Vec::new(), Vec::new());
     for Seen { camera, may_judge, .. } in seen {
         if may_judge && judges.len() < judging {
@@ -114,17 +117,17 @@ pub(crate) fn find(
 
 /// A view that was tried.
 struct Seen {
-    /// Its rank by detail among those of its kind, as a share of their number.
+    /// Rank by detail among the views of its kind, from 0 to 1, divided by their number.
     rank: f64,
-    /// Whether it may judge: every second one of its kind.
+    /// Whether the view may judge: true for every second view of its kind.
     may_judge: bool,
-    /// The share of pixels that show something.
+    /// Share of the pixels that show something.
     lit: f64,
     camera: Camera,
 }
 
-/// Returns `count` natural views of `splats`, evenly spread over its opaque Gaussians in their order. Of each few neighbours it is
-/// the view in which Gaussians look most alike in size.
+/// Returns `count` natural views of `splats`, evenly spread over its opaque Gaussians in their order. Each is the
+/// one of a few neighbours from which Gaussians look most alike in size.
 pub(crate) fn evenly(splats: &Splats, count: usize) -> Vec<Camera> {
     let views = natural_views(&splats.geometry, CHOICE * count, SIZE);
     let sizes = Sizes::of(&splats.geometry);
@@ -133,8 +136,9 @@ pub(crate) fn evenly(splats: &Splats, count: usize) -> Vec<Camera> {
     views.chunks(CHOICE).filter_map(least).collect()
 }
 
-/// `count` natural views of `splats` to try: some from where photographs were likely taken, and others from where Gaussians look
-/// most alike in size. The former are none if no colour depends on the view.
+/// Returns two lists of natural views of `splats` to try. The first has views from likely places of photographs. It is
+/// empty if no colour depends on the view. The second has views from which Gaussians look most alike in size. Without the
+/// first list it has `count` views; otherwise both have half as many.
 fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {
     let views = natural_views(&splats.geometry, CHOICE * count, SIZE);
     let sizes = Sizes::of(&splats.geometry);
@@ -154,14 +158,14 @@ fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {
             (0..views.len()).map(|k| likelihood(&observed, views[k].position, &sizes[k])).collect();
         let chosen = best(&|k| -likelihoods[k], count / PHOTO_SHARE);
         photo = chosen.iter().map(|&k| turned(&views[k], k, &observed)).collect();
-        // As many fewer, evenly spread.
+        // The other views are thinned by the same factor, evenly.
         others = others.into_iter().step_by(PHOTO_SHARE).collect();
     }
     (photo, others.into_iter().map(|k| views[k].clone()).collect())
 }
 
-/// A copy of `splats` that is faster to draw: without view-dependent colour, without what is hardly visible, and with
-/// neighbours side by side.
+/// Returns a copy of `splats` that is faster to draw: without view-dependent colour, without Gaussians that are hardly
+/// visible, and in an order that puts neighbours side by side.
 pub(crate) fn sketch(splats: &Splats) -> Splats {
     let mut sketch = splats.with_degree_cut(ShDegree::ZERO);
     let keep: Vec<bool> = splats.geometry.opacities.iter().map(|&opacity| opacity > FAINT).collect();
@@ -169,13 +173,13 @@ pub(crate) fn sketch(splats: &Splats) -> Splats {
     sketch.gathered(&curve_order(&sketch.geometry))
 }
 
-/// The share of pixels that show something.
+/// Returns the share of the pixels that show something.
 fn lit(picture: &Image) -> f64 {
     let lit = picture.pixels.iter().filter(|pixel| pixel.iter().any(|value| *value > LIT)).count();
     lit as f64 / picture.pixels.len().max(1) as f64
 }
 
-/// Mean difference of neighbouring pixels.
+/// Returns the mean absolute difference of neighbouring pixels, summed over the channels and over both directions.
 pub(crate) fn detail(picture: &Image) -> f64 {
     let width = picture.width as usize;
     let difference = |a: &[f32; 3], b: &[f32; 3]| -> f64 {

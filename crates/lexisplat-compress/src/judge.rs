@@ -1,4 +1,4 @@
-//! The score of a compressed scene over the judging views.
+//! The score of a compressed scene over the views that judge.
 
 use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, squared_error};
@@ -6,13 +6,14 @@ use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, squared_er
 use crate::decibels::decibels;
 use crate::error::Result;
 
-/// PSNR that identical pictures count as, in dB, so that means are finite.
+/// PSNR of identical pictures, in dB, so that means are finite.
 const IDENTICAL: f64 = 100.0;
 
-/// Photographs are about as hard as the hardest of this many parts of generated views (docs/METHOD.md, "The judging views").
+/// Inverse of the share of generated views, the hardest ones, that are about as hard as photographs (docs/METHOD.md, "The
+/// judging views").
 const HARD_PARTS: usize = 4;
 
-/// Scores models of one scene against the scene itself.
+/// Scores models of a scene against the scene itself.
 #[derive(Debug)]
 pub struct Judge {
     renderer: Renderer,
@@ -25,17 +26,18 @@ pub struct Judge {
 struct View {
     camera: Camera,
     original: Image,
-    /// Number of pixels that the squared error is divided by.
+    /// Number of pixels by which the squared error is divided.
     pixels: u64,
 }
 
 impl Judge {
-    /// Draws `splats` from the cameras `judging` with `renderer`, which will also draw the models. The cameras were
-    /// `given`, or else generated. Reports [`Stage::Draw`], in views, to `progress`, which can cancel.
+    /// Draws the original `splats` from the cameras `judging`. `renderer` draws the originals and later the models. `given`
+    /// tells whether the cameras were given or generated. Reports [`Stage::Draw`] to `progress`, in views. `progress` can
+    /// cancel.
     ///
     /// # Errors
-    /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene
-    /// or a view does not fit.
+    /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene or a
+    /// view does not fit.
     pub fn new(
         mut renderer: Renderer,
         splats: &Splats,
@@ -57,7 +59,8 @@ impl Judge {
         Ok(Self { renderer, views: drawn, given })
     }
 
-    /// Judges `part` of a scene. Only the pixels that it covers count, for others of the scene are in all of them.
+    /// Returns a judge of a `part` of a scene. Squared errors are divided by the number of pixels that the part covers,
+    /// because the other pixels show other parts.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -78,19 +81,19 @@ impl Judge {
         Ok(judge)
     }
 
-    /// Number of views that judge.
+    /// Returns the number of views that judge.
     #[must_use]
     pub fn views(&self) -> usize {
         self.views.len()
     }
 
-    /// Whether the views are given cameras. Otherwise they were generated.
+    /// Returns whether the views are given cameras. Otherwise they were generated.
     #[must_use]
     pub fn views_are_given(&self) -> bool {
         self.given
     }
 
-    /// The same views of `splats`, against which models are scored instead.
+    /// Returns a judge with the same views that scores models against `splats` instead.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -99,11 +102,11 @@ impl Judge {
         Self::new(self.renderer, splats, &cameras, self.given, progress)
     }
 
-    /// Scores a model or another scene. Reports [`Stage::Draw`], in views, to `progress`, which can cancel.
+    /// Scores a model or another scene. Reports [`Stage::Draw`] to `progress`, in views. `progress` can cancel.
     ///
     /// # Errors
-    /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene
-    /// or a view does not fit.
+    /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene or a
+    /// view does not fit.
     pub fn score<'a>(&mut self, scene: impl Into<Scene<'a>>, progress: &dyn Progress) -> Result<Score> {
         let scene = self.renderer.prepare(scene.into())?;
         let mut all = Vec::with_capacity(self.views.len());
@@ -124,25 +127,26 @@ impl Judge {
     }
 }
 
-/// Number of pixels of `camera` that a scene covers, which is drawn over black and over white.
+/// Returns the number of pixels of `camera` that a scene covers. `black` and `white` are pictures of the scene over a black
+/// and a white background.
 fn covered(camera: &Camera, black: &Image, white: &Image) -> u64 {
     let pairs = black.pixels.iter().zip(&white.pixels).enumerate();
     let within = pairs.filter(|(drawn, _)| camera.place_of_drawn(*drawn).is_some());
-    // What is seen of the background, in each channel alike.
+    // The share of the background in each pixel, which is equal in all channels.
     let open: f64 = within.map(|(_, (black, white))| f64::from(white[0] - black[0]).clamp(0.0, 1.0)).sum();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the number of pixels")]
     let covered = (camera.drawn_pixels() as f64 - open).max(0.0).round() as u64;
     covered
 }
 
-/// PSNR over the judging views, in dB.
+/// PSNR over the views that judge, in dB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// What photographs are expected to show on average: the mean of given views, or that of the worst quarter of
-    /// generated ones.
+    /// The PSNR that photographs are expected to have on average: the mean over all views if the views were given,
+    /// otherwise the mean over the quarter of the views with the lowest PSNR.
     pub judged: f64,
-    /// The mean of all views.
+    /// The mean over all views.
     pub mean: f64,
-    /// The least of a view.
+    /// The lowest PSNR of a view.
     pub least: f64,
 }

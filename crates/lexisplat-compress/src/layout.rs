@@ -1,11 +1,12 @@
-//! Which layout the choices of a user mean.
+//! The layout that the choices of a user need.
 
 use lexisplat::Layout;
 
 use crate::error::{Error, Result};
 
-/// The layout that is `asked` for, or the one that other choices need: `exact` and `packed` name a choice that only layouts
-/// with exact geometry, or only packed files, have. A tolerance alone means exact geometry.
+/// Returns the layout `asked` for, or else the layout that the other choices need. `exact` names a choice that only layouts
+/// with exact geometry have, and `packed` one that only packed files have. A tolerance without other choices needs exact
+/// geometry.
 ///
 /// # Errors
 /// [`Error::Parameter`] for a layout and a choice that do not go together.

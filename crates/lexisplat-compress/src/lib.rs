@@ -1,6 +1,6 @@
-//! Compresses a 3D Gaussian Splatting scene to a quality that views of it are judged by, or to a size.
+//! Compresses a 3D Gaussian Splatting scene to a quality of its pictures, or to a size.
 //!
-//! [`compress`] does what the program `lexisplat compress` does, with the same bytes:
+//! [`compress`] does what the program `lexisplat compress` does, and writes the same bytes:
 //!
 //! ```
 //! # use lexisplat_sample::{SampleOptions, scene};
@@ -16,16 +16,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Below it, [`Compression`] holds all choices, of packed files ([`Packing`]) and of exact ones, and [`Compression::run`] takes
-//! any source and sink. A scene goes through these steps:
+//! Start with [`Compress`], which has the common choices. [`Compression`] has all choices, for packed files ([`Packing`]) and for
+//! files with exact geometry. [`Compression::run`] takes any source and any sink.
 //!
-//! 1. [`PackingViews`]: cameras that are given or lie beside the scene, or views like photographs that are found.
-//! 2. [`Looked`]: how pictures from these views depend on each value of each Gaussian.
-//! 3. [`lexisplat::packed::Packer`]: a file at one overall step.
-//! 4. Refitting: base colours and opacities make up for what the file lost.
-//! 5. [`Judge`]: the score of the file. A [`Target`] searches for the step, from 3 on.
+//! A scene is packed in these steps:
 //!
-//! Scenes in parts go through 1 to 4 part by part ([`tiles`]). docs/METHOD.md has the reasons, and the figures.
+//! 1. [`PackingViews`] chooses the cameras: given cameras, cameras that lie beside the scene, or views like photographs, which a
+//!    search finds.
+//! 2. [`Looked`] has the sensitivity: how much the pictures from these cameras depend on each value of each Gaussian.
+//! 3. [`lexisplat::packed::Packer`] makes a file at one overall step of quantisation.
+//! 4. Refitting fits base colours and opacities to the pictures of the original, which makes up for removal and quantisation.
+//! 5. [`Judge`] scores the file. The search for a [`Target`] repeats steps 3 to 5 at other overall steps.
+//!
+//! A scene in parts goes through steps 1 to 4 part by part ([`tiles`]). docs/METHOD.md has the reasons and the figures.
 
 mod alone;
 mod beginning;

@@ -1,4 +1,4 @@
-//! Views as bytes, which pass from the process that looked at a part of a scene to the one that refits it.
+//! Views as bytes. They pass from the process that measures a part of a scene to the process that refits the part.
 
 use lexisplat_render::Camera;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use crate::packing_views::PackingViews;
 /// Name of the bytes in errors.
 const MEMO: &str = "memo";
 
-/// The views of [`PackingViews`] that were not given.
+/// The generated views of a [`PackingViews`].
 #[derive(Serialize, Deserialize)]
 struct Memo {
     measuring: Vec<View>,
@@ -42,18 +42,18 @@ impl From<View> for Camera {
     }
 }
 
-/// Bytes of `views`, which were found.
+/// Returns the bytes of `views`, which a search found.
 pub(crate) fn memo_of(views: &PackingViews) -> Vec<u8> {
     let list = |cameras: &[Camera]| cameras.iter().map(View::from).collect();
     let memo = Memo { measuring: list(views.measuring()), judging: list(views.judging()) };
-    // Vectors of numbers and names are always written.
+    // Vectors of numbers and names can always be serialised.
     serde_json::to_vec(&memo).unwrap_or_default()
 }
 
-/// The views that [`memo_of`] wrote.
+/// Returns the views whose bytes [`memo_of`] made.
 ///
 /// # Errors
-/// [`Error::Parameter`] for anything else.
+/// [`Error::Parameter`] for any other bytes.
 pub(crate) fn views_of(memo: &[u8]) -> Result<PackingViews> {
     let read: Memo = serde_json::from_slice(memo)
         .map_err(|error| Error::parameter(MEMO, error.to_string(), "views that were found"))?;

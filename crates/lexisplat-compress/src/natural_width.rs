@@ -1,30 +1,30 @@
-//! How sharp pictures of a scene are meant to be.
+//! The sharpness that pictures of a scene are meant to have.
 
 use lexisplat::Geometry;
 use lexisplat_render::Camera;
 
 use crate::views::DEFAULT_MAX_WIDTH;
 
-/// Median size of a Gaussian on screen, in pixels, in pictures as sharp as those of training: the standard deviation, as the
-/// geometric mean of the two larger ones. Over training views of eight models, of three trainers, it is 0.9 to 1.8
-/// (docs/METHOD.md, "How sharp").
+/// Median size of a Gaussian on screen, in pixels, in pictures as sharp as the training photographs. The size is the
+/// standard deviation: the geometric mean of the two larger ones. Over training views of eight models of three trainers the
+/// median is 0.9 to 1.8 (docs/METHOD.md, "How sharp").
 const MEDIAN_SIZE: f64 = 1.25;
-/// Gaussians of less opacity than this, 10 %, before the sigmoid, do not count.
+/// Smallest opacity of a Gaussian that counts, 10 %, before the sigmoid.
 const FAINT: f32 = -2.2;
-/// Sizes that the median is taken over, about.
+/// Approximate number of sizes over which the median is taken.
 const SIZES: usize = 1 << 18;
-/// Least width, in pixels.
+/// Smallest width, in pixels.
 const LEAST_WIDTH: u32 = 192;
 
-/// The width of pictures from `cameras`, which all have one size, at which the scene is as sharp as its training saw it: by the
-/// sizes of the Gaussians before each camera. At most what papers draw ([`DEFAULT_MAX_WIDTH`]), at least [`LEAST_WIDTH`]; the
-/// width of the first camera if none sees anything.
+/// Returns the width of pictures from `cameras`, in pixels, at which the median size of Gaussians on screen is
+/// [`MEDIAN_SIZE`]. All cameras have the same size. The width is at least [`LEAST_WIDTH`] and at most
+/// [`DEFAULT_MAX_WIDTH`], as drawn in papers. If no camera sees a Gaussian, the width of the first camera is returned.
 pub(crate) fn natural_width(geometry: &Geometry, cameras: &[Camera]) -> u32 {
     let Some(first) = cameras.first() else { return DEFAULT_MAX_WIDTH };
     let step = (geometry.len() * cameras.len()).div_ceil(SIZES).max(1);
     let mut sizes = Vec::new();
     for (k, camera) in cameras.iter().enumerate() {
-        // Each camera looks at others.
+        // Each camera takes other Gaussians than the one before it.
         for i in (k % step..geometry.len()).step_by(step) {
             sizes.extend(size(geometry, i, camera));
         }
@@ -40,7 +40,8 @@ pub(crate) fn natural_width(geometry: &Geometry, cameras: &[Camera]) -> u32 {
     width
 }
 
-/// The size of Gaussian `i` in the picture of `camera`, in pixels; `None` if it is outside, faint or not finite.
+/// Returns the size of Gaussian `i` in the picture of `camera`, in pixels; `None` if the Gaussian is outside of the
+/// picture, faint or not finite.
 fn size(geometry: &Geometry, i: usize, camera: &Camera) -> Option<f64> {
     let [x, y, z] = camera.to_view(geometry.positions[i]).map(f64::from);
     let within = |v: f64, focal: f32, side: u32| (v / z * f64::from(focal)).abs() * 2.0 < f64::from(side);

@@ -1,20 +1,20 @@
-//! Tells from view-dependent colours where a scene was seen from.
+//! Estimates from view-dependent colours the places from which a scene was seen.
 //!
-//! Training begins with view-dependent colours of 0, and each photograph moves them at the direction that it was taken from. So
-//! the square of a Gaussian's view-dependent colour is on average larger at directions that were seen than at others, where it
-//! is what the SH basis makes of the former.
+//! Training begins with view-dependent colours of 0. Each photograph changes them in the direction from which it was taken.
+//! The square of a Gaussian's view-dependent colour is therefore larger on average in directions that were seen. In other
+//! directions it is whatever the SH basis makes of the coefficients that the seen directions need.
 
 use lexisplat::packed::curve_order;
 use lexisplat::sh::rest_basis;
 use lexisplat::{ShDegree, Splats};
 
-/// Gaussians of less opacity than this, 30 %, before the sigmoid, do not count.
+/// Smallest opacity of a Gaussian that counts, 30 %, before the sigmoid.
 const FAINT: f32 = -0.85;
 /// Number of groups of neighbours.
 const GROUPS: usize = 256;
-/// Gaussians that the median of squared colours is taken over, about.
+/// Approximate number of Gaussians over which the median of squared colours is taken.
 const ASKED: usize = 16_384;
-/// Solid angle of all directions.
+/// Solid angle of the sphere.
 const SPHERE: f32 = 4.0 * std::f32::consts::PI;
 
 /// The view-dependent colours of a scene, by groups of neighbours.
@@ -27,24 +27,24 @@ pub(crate) struct ObservedDirections {
 struct Group {
     middle: [f32; 3],
     count: f32,
-    /// Products of two coefficients of a channel, row by row, summed over Gaussians and channels. Those of each Gaussian are
-    /// divided by the sum of its squares.
+    /// Sums over Gaussians and channels of the products of two coefficients of a channel, row by row. The products of each
+    /// Gaussian are divided by the sum of its squared coefficients.
     products: Vec<f32>,
 }
 
-/// A group as seen from somewhere.
+/// A group seen from a position.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen {
-    /// The unit vector towards it.
+    /// Unit vector from the position to the group.
     pub(crate) direction: [f32; 3],
-    /// The mean of squared view-dependent colours in this direction, as a multiple of their mean over all directions.
+    /// Mean squared view-dependent colour in this direction, as a multiple of its mean over all directions.
     pub(crate) focus: f32,
-    /// Its number of Gaussians.
+    /// Number of Gaussians of the group.
     pub(crate) count: f32,
 }
 
 impl ObservedDirections {
-    /// Those of `splats`. Gaussians whose view-dependent colour is below the median do not count.
+    /// Groups the Gaussians of `splats`. Gaussians whose view-dependent colour is below the median do not count.
     pub(crate) fn of(splats: &Splats) -> Self {
         let (dim, each) = (splats.degree.rest(), splats.degree.rest_per_channel());
         let rest = |i: usize| &splats.sh_rest[i * dim..(i + 1) * dim];
@@ -82,12 +82,12 @@ impl ObservedDirections {
         Self { groups, degree: splats.degree }
     }
 
-    /// Whether nothing depends on the view.
+    /// Returns whether no colour depends on the view.
     pub(crate) fn is_empty(&self) -> bool {
         self.groups.is_empty()
     }
 
-    /// The groups as seen from `position`.
+    /// Returns the groups as seen from `position`.
     pub(crate) fn from(&self, position: [f32; 3]) -> impl Iterator<Item = Seen> + '_ {
         let each = self.degree.rest_per_channel();
         self.groups.iter().filter_map(move |Group { middle, count, products }| {

@@ -1,8 +1,8 @@
-//! Progress of work within other work.
+//! Progress of work that is a part of other work.
 
 use lexisplat::Progress;
 
-/// Passes cancellation on, but no reports: those of the work around it go on.
+/// Passes cancellation on, but no reports, because the surrounding work reports its own progress.
 pub(crate) struct OnlyCancels<'a>(pub(crate) &'a dyn Progress);
 
 impl Progress for OnlyCancels<'_> {
@@ -11,7 +11,7 @@ impl Progress for OnlyCancels<'_> {
     }
 }
 
-/// Passes on what is done, but not where its steps begin and end: they are parts of a longer step.
+/// Passes on how much is done, but not where steps begin and end, because they are parts of a longer step.
 pub(crate) struct OneStep<'a>(pub(crate) &'a dyn Progress);
 
 impl Progress for OneStep<'_> {

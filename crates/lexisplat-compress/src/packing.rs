@@ -1,4 +1,4 @@
-//! How to compress: the choices, and which of them go together.
+//! The choices of a compression, and which of them go together.
 
 use std::sync::Arc;
 
@@ -12,37 +12,38 @@ use crate::packing_views::Looked;
 use crate::target::Target;
 use crate::views::Viewpoints;
 
-/// Bytes of memory that packing a whole scene takes: so many, and tenths of a byte for each byte of its source. A PLY of 99 MB
-/// took 540 MB, one of 793 MB 2,320 MB, without the pages of the file itself (docs/results/sizes.md).
+/// Estimate of the memory that packing a whole scene takes: `MEMORY` bytes, and `MEMORY_PER_TEN_BYTES` bytes for each ten
+/// bytes of the source. A PLY of 99 MB took 540 MB, one of 793 MB 2,320 MB, without the pages of the file itself
+/// (docs/results/sizes.md).
 const MEMORY: u64 = 320_000_000;
 const MEMORY_PER_TEN_BYTES: u64 = 26;
-/// Bytes of memory that the program and the Python package allow by default for packing a whole scene.
+/// Default of the program and of the Python package for the memory that packing a whole scene may take, in bytes.
 pub const DEFAULT_MEMORY: u64 = 4 << 30;
-/// Most Gaussians of a scene without cameras that is packed whole. Pictures of a larger one as a whole show each of its Gaussians too
-/// seldom: files in parts are 4 % larger at equal quality for 0.4 million Gaussians, and 25 % smaller for 1.2 million
-/// (docs/results/sizes.md).
+/// Largest number of Gaussians of a scene without cameras that is packed whole. The views of a larger scene show each Gaussian too
+/// seldom. Relative to whole scenes at equal quality, files in parts are 4 % larger for 0.4 million Gaussians and 25 % smaller for
+/// 1.2 million (docs/results/sizes.md).
 const MOST_WHOLE: u64 = 786_432;
 
 /// Name of [`Packing::with_max_gaussians`] in errors.
 const MAX_GAUSSIANS: &str = "max-gaussians";
 
-/// How to compress a scene.
+/// The choices of a compression.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Compression {
-    /// The geometry stays exact, and the SH become codes over a dictionary, laid out as given.
+    /// The geometry stays exact. The SH become codes over a dictionary, in the given layout.
     Exact(CompressOptions, CodeLayout),
-    /// Everything is quantised and entropy-coded as far as views of the scene allow.
+    /// Everything is quantised and entropy-coded. Views of the scene measure the effect of errors and judge the file.
     Packed(Packing),
-    /// Everything is quantised and entropy-coded without drawing the scene: what shows follows from each
-    /// Gaussian alone. Several times faster than [`Self::Packed`], for larger files of the same quality. The
+    /// Everything is quantised and entropy-coded without drawing the scene. The effect of errors is guessed from each
+    /// Gaussian alone. This is several times faster than [`Self::Packed`], and makes larger files of the same quality. The
     /// scene is never whole in memory.
     Guessed(Preset, PackOptions),
 }
 
 impl Compression {
-    /// The same with these cameras if they seem to belong to the scene ([`Packing::with_likely_cameras`]), if it is one that
-    /// draws.
+    /// Returns this compression with cameras that are used if they seem to belong to the scene
+    /// ([`Packing::with_likely_cameras`]). Only [`Self::Packed`] changes.
     #[must_use]
     pub fn with_likely_cameras(self, cameras: Vec<Camera>) -> Self {
         match self {
@@ -51,7 +52,7 @@ impl Compression {
         }
     }
 
-    /// The same with these cameras ([`Packing::with_cameras`]), if it is one that draws.
+    /// Returns this compression with these cameras ([`Packing::with_cameras`]). Only [`Self::Packed`] changes.
     #[must_use]
     pub fn with_cameras(self, cameras: Vec<Camera>) -> Self {
         match self {
@@ -76,9 +77,9 @@ impl From<Packing> for Compression {
 /// The quality of a packed file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quality {
-    /// A quality by name, which at most three packings give.
+    /// A quality by name. It takes at most three packings.
     Preset(Preset),
-    /// A quality or a size that a search reaches.
+    /// A quality or a size, which a search reaches.
     Target(Target),
 }
 
@@ -94,10 +95,10 @@ impl From<Target> for Quality {
     }
 }
 
-/// How to pack a scene by what shows in views of it.
+/// The choices of packing a scene by its pictures.
 ///
-/// A large scene, and one that needs more than the memory allowed, is packed part by part, each part by its own views, if no
-/// choice needs the whole scene: cameras, viewpoints, a limit of Gaussians, and targets other than a mean PSNR do.
+/// A scene that is large, or needs more than the memory allowed, is packed part by part, with views of each part. Some
+/// choices need the whole scene: given cameras, viewpoints, a limit of Gaussians, and targets other than a mean PSNR.
 #[derive(Debug, Clone)]
 pub struct Packing {
     pub(crate) quality: Quality,
@@ -118,7 +119,7 @@ impl Default for Packing {
 }
 
 impl Packing {
-    /// Packs to `quality`, by views generated around the scene that the processor draws, in any memory.
+    /// Returns choices for `quality`. Views are generated, the processor draws, and memory is not limited.
     #[must_use]
     pub fn new(quality: impl Into<Quality>) -> Self {
         Self {
@@ -134,63 +135,63 @@ impl Packing {
         }
     }
 
-    /// Packs with these options of the codec.
+    /// Sets the options of the codec.
     #[must_use]
     pub fn with_options(self, options: PackOptions) -> Self {
         Self { options, ..self }
     }
 
-    /// Measures and judges by these cameras instead of generated ones. Their positions are relative to the scene's
-    /// [offset](lexisplat::SceneMeta::offset), as those of Gaussians are. [`Compression::run`] refuses fewer than
-    /// two.
+    /// Measures and judges by these cameras instead of generated ones. Positions of cameras, like those of Gaussians, are
+    /// relative to the scene's [offset](lexisplat::SceneMeta::offset). [`Compression::run`] refuses fewer than two cameras.
     #[must_use]
     pub fn with_cameras(self, cameras: Vec<Camera>) -> Self {
         Self { cameras: Some(cameras), ..self }
     }
 
-    /// Measures and judges by these cameras if they seem to belong to the scene, as [`Self::with_cameras`] does, and otherwise
-    /// as if there were none. Nothing but the default viewpoints go with them, and a scene that is packed part by part does
-    /// without. The report says whether they were used: [`ReachedRecord::cameras`](lexisplat::packed::ReachedRecord::cameras).
+    /// Measures and judges by these cameras, as [`Self::with_cameras`] does, if they seem to belong to the scene. Otherwise
+    /// they are ignored. They are also ignored with other viewpoints than the default, and by a scene that is packed part
+    /// by part. The report tells whether they were used:
+    /// [`ReachedRecord::cameras`](lexisplat::packed::ReachedRecord::cameras).
     #[must_use]
     pub fn with_likely_cameras(self, cameras: Vec<Camera>) -> Self {
         Self { likely_cameras: Some(cameras), ..self }
     }
 
-    /// Measures and judges by views around an object or inside a room. By default views like photographs are looked
-    /// for. Cameras that are given count more.
+    /// Measures and judges by views around an object or inside a room. By default a search finds views like photographs.
+    /// Given cameras take precedence.
     #[must_use]
     pub fn with_viewpoints(self, viewpoints: Viewpoints) -> Self {
         Self { viewpoints, ..self }
     }
 
-    /// Draws on `gpu`, or on the processor if there is none. The file records a GPU, because its results are not
-    /// the same on every machine.
+    /// Draws on `gpu`, or on the processor if `gpu` is `None`. The file records the name of a GPU, because the results of
+    /// GPUs differ from machine to machine.
     #[must_use]
     pub fn with_gpu(self, gpu: Option<Gpu>) -> Self {
         Self { gpu, ..self }
     }
 
-    /// Allows about `bytes` bytes of memory for packing a whole scene. A scene that needs more is packed part by
-    /// part, which takes up to 1.5 GiB however small `bytes` is.
+    /// Allows about `bytes` bytes of memory for packing a whole scene. A scene that needs more is packed part by part,
+    /// which takes up to 1.5 GiB, however small `bytes` is.
     #[must_use]
     pub fn with_memory(self, bytes: u64) -> Self {
         Self { memory: bytes, ..self }
     }
 
-    /// Packs by what looking at the scene gave before, for several files of one scene.
+    /// Uses views and sensitivity that were measured before, for several files of one scene.
     #[must_use]
     pub fn with_looked(self, looked: Arc<Looked>) -> Self {
         Self { looked: Some(looked), ..self }
     }
 
-    /// Leaves out the Gaussians that show least until there are at most this many, 1 or more. A preset is then the quality
-    /// of the file beside that scene; a target in decibels is beside the scene that was given.
+    /// Removes the Gaussians that show least until there are at most `most`, 1 or more. A preset is then the quality
+    /// relative to the reduced scene. A target in decibels is relative to the original scene.
     #[must_use]
     pub fn with_max_gaussians(self, most: impl Into<Option<usize>>) -> Self {
         Self { max_gaussians: most.into(), ..self }
     }
 
-    /// The renderer that the choices mean.
+    /// Returns the renderer on the chosen device.
     pub(crate) fn renderer(&self) -> Result<Renderer> {
         match &self.gpu {
             Some(gpu) => Ok(Renderer::on(gpu)?),
@@ -198,7 +199,7 @@ impl Packing {
         }
     }
 
-    /// Refuses choices that are out of range or do not go together.
+    /// Returns an error for choices that are out of range or do not go together.
     pub(crate) fn check(&self) -> Result<()> {
         if let Quality::Target(target) = self.quality {
             target.check()?;
@@ -213,11 +214,11 @@ impl Packing {
         }
     }
 
-    /// Whether a scene of `gaussians` Gaussians, which are `bytes` bytes without compression, is packed whole, with or without
-    /// cameras that belong to it. Otherwise it is packed part by part.
+    /// Returns whether a scene is packed whole. Otherwise it is packed part by part. The scene has `gaussians` Gaussians
+    /// and takes `bytes` bytes without compression. `cameras` tells whether cameras belong to it.
     ///
     /// # Errors
-    /// [`Error::Memory`] if the memory allowed is too small for the whole scene and a choice needs it.
+    /// [`Error::Memory`] if a choice needs the whole scene and the memory allowed is too small.
     pub(crate) fn is_whole(&self, gaussians: u64, bytes: u64, cameras: bool) -> Result<bool> {
         let grows = u128::from(bytes) * u128::from(MEMORY_PER_TEN_BYTES) / 10;
         let needed = u64::try_from(grows).unwrap_or(u64::MAX).saturating_add(MEMORY);
@@ -229,10 +230,10 @@ impl Packing {
         }
     }
 
-    /// The quality that is asked for, in dB.
+    /// Returns the PSNR asked for, in dB.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for other targets than a mean PSNR.
+    /// [`Error::Parameter`] for targets other than a mean PSNR.
     pub(crate) fn decibels(&self) -> Result<f64> {
         match self.quality {
             Quality::Preset(preset) => Ok(preset.decibels()),
@@ -243,7 +244,7 @@ impl Packing {
         }
     }
 
-    /// The first choice that needs the whole scene in memory.
+    /// Returns the name of the first choice that needs the whole scene in memory.
     fn needs_whole(&self) -> Option<&'static str> {
         match self.quality {
             Quality::Target(target) if !matches!(target, Target::MeanPsnr(_)) => Some(target.name()),

@@ -1,4 +1,4 @@
-//! The views that packing draws: some measure the sensitivity, some judge the result.
+//! The views that packing draws. Some measure the sensitivity, and some judge the result.
 
 use lexisplat::packed::curve_order;
 use lexisplat::{Geometry, Progress, Sensitivity, Splats};
@@ -9,73 +9,73 @@ use crate::found::{Found, evenly, find};
 use crate::sharp_views::sampled;
 use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints};
 
-/// Number of generated views that measure. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have
-/// fewer, for a view of so many Gaussians takes long.
+/// Number of generated views that measure: [`GAUSSIANS_DRAWN`] over the number of Gaussians, within this range. Views of
+/// many Gaussians take long to draw.
 const GENERATED_VIEWS: std::ops::RangeInclusive<usize> = 24..=96;
-/// Gaussians drawn in all generated views together, about.
+/// Approximate number of Gaussians drawn in all generated views together.
 const GAUSSIANS_DRAWN: usize = 48_000_000;
-/// Number of views that are found and measure: one for [`GAUSSIANS_OF_A_VIEW`], within these, and in scenes of many Gaussians
-/// one for [`GAUSSIANS_OF_A_LARGE_VIEW`], up to the last.
+/// Number of found views that measure. It is the number of Gaussians over [`GAUSSIANS_OF_A_VIEW`], within this range. In
+/// large scenes it is the number of Gaussians over [`GAUSSIANS_OF_A_LARGE_VIEW`] if that is more, up to
+/// [`MOST_FOUND_VIEWS`].
 const FOUND_VIEWS: std::ops::RangeInclusive<usize> = 48..=192;
 const GAUSSIANS_OF_A_VIEW: usize = 256;
 const GAUSSIANS_OF_A_LARGE_VIEW: usize = 2048;
 const MOST_FOUND_VIEWS: usize = 256;
-/// Number of views that are found and judge: one of this many that measure, within these.
+/// Number of found views that judge: the number of found views that measure over [`FOUND_JUDGE_SHARE`], within this range.
 const FOUND_JUDGES: std::ops::RangeInclusive<usize> = 24..=48;
 const FOUND_JUDGE_SHARE: usize = 4;
 /// Width and height of generated views, in pixels.
 pub(crate) const GENERATED_SIZE: [u32; 2] = [384, 256];
-/// Distances of generated views that measure, in radii of the scene's detail.
+/// Distances from which generated views measure, in radii of the scene's detail.
 const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
-/// Number of views that measure a part of a large scene beside those of a whole one. They are evenly spread over its Gaussians. A part
-/// may have some Gaussians far from all others, and views like photographs of the part seldom show those.
+/// Number of views evenly spread over the Gaussians of a part of a scene. A part may have some Gaussians far from all others, which
+/// views like photographs of the part seldom show. Every `EVEN_JUDGE_SHARE`-th of these views judges, the others measure.
 const EVEN_VIEWS: usize = 96;
-/// One of this many of them judges instead.
 const EVEN_JUDGE_SHARE: usize = 4;
-/// Number of generated views that judge.
+/// Number of generated views that judge, plus 1.
 const JUDGES: usize = 24;
-/// Pixels that measure, in all views together: so many, and so many more for each Gaussian, but no more than the last. Of
-/// sharper pictures some squares are drawn ([`sampled`]). Half as many gave files that were 16 % larger at equal quality on the
-/// large room, and about the same on scenes of up to 90,000 Gaussians (docs/METHOD.md, "How sharp").
+/// Number of pixels that measure, in all views together. Of sharper pictures only some squares are drawn ([`sampled`]).
+/// With half as many pixels files were 16 % larger at equal quality on the large room, and about the same on scenes of up
+/// to 90,000 Gaussians (docs/METHOD.md, "How sharp").
 const MEASURED_PIXELS: Pixels = Pixels { always: 8_000_000, each: 30, most: 40_000_000 };
-/// Those that judge a whole scene, and a part of a large one.
+/// Numbers of pixels that judge a whole scene, and a part of a scene.
 const JUDGED_PIXELS: u64 = 8_000_000;
 const PART_JUDGED_PIXELS: u64 = 2_000_000;
-/// Number of views that judge a part.
+/// Largest number of views that judge a part of a scene.
 const PART_JUDGES: usize = 24;
-/// Those that base colours and opacities are fitted to.
+/// Number of pixels to which base colours and opacities are fitted.
 const FITTED_PIXELS: Pixels = Pixels { always: 12_000_000, each: 6, most: 24_000_000 };
-/// Share of them that a part of a large scene is fitted to. With twice as many, three copies of room-large have 0.14 dB more, in
-/// 1.2 times the time.
+/// Divisor of [`FITTED_PIXELS`] for a part of a scene. With half this divisor three copies of room-large have 0.14 dB more,
+/// in 1.2 times the time.
 const PART_FITTED_SHARE: u64 = 4;
-/// One of this many views that measure is drawn at half its size too, and one of this many that are fitted to is at half its
-/// size. Otherwise errors that are even over many pixels count for too little, and show when pictures are drawn smaller
-/// (docs/METHOD.md, "How sharp").
+/// Every `MEASURED_HALVED`-th view that measures is also drawn at half its size. Every `FITTED_HALVED`-th view for fitting
+/// is at half its size instead. Otherwise errors that are even over many pixels count for too little, and show when
+/// pictures are drawn smaller (docs/METHOD.md, "How sharp").
 const MEASURED_HALVED: usize = 2;
 const FITTED_HALVED: usize = 3;
-/// Number of given cameras that are used at most, evenly spread.
+/// Largest number of given cameras that are used. They are chosen evenly.
 const MAX_VIEWS: usize = 150;
-/// One of this many given cameras judges. All of them measure, so the judging views score up to 0.1 dB better
+/// Every `JUDGE_SHARE`-th given camera judges. All given cameras measure, so the judging views score up to 0.1 dB better
 /// than views that did not measure (docs/METHOD.md).
 const JUDGE_SHARE: usize = 2;
-/// Views from beside given cameras that measure too. Without them Gaussians that only such views show have coarse steps
-/// (docs/METHOD.md).
+/// Number of views beside given cameras that measure too. Without them Gaussians that only such views show have coarse
+/// steps (docs/METHOD.md).
 const ASIDE: usize = 20;
-/// Most views that base colours and opacities are fitted to, of views that were found.
+/// Largest number of found views to which base colours and opacities are fitted.
 const FITTED_FOUND: usize = 64;
-/// Most given cameras that base colours and opacities are fitted to.
+/// Largest number of given cameras to which base colours and opacities are fitted.
 const FITTED_GIVEN: usize = 40;
-/// Views from all around that they are fitted to beside given cameras.
+/// Number of views from all around to which base colours and opacities are fitted too, beside given cameras.
 const FITTED_AROUND: usize = 8;
-/// Share of the views whose positions are nearest to the one in their middle, which viewpoints are chosen from.
+/// Share of the judging views that viewpoints are chosen from: those whose positions are nearest to the one in the middle.
 const USUAL_VIEWS: f32 = 0.67;
-/// Weight of the guess in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
+/// Weight of the guess in [`Sensitivity::blend_with_prior`]. It is the best weight on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
 
-/// A number of pixels that grows with a scene.
+/// A number of pixels: `always + each * gaussians`, and at most `most`.
 struct Pixels {
     always: u64,
-    /// For each Gaussian.
+    /// Pixels for each Gaussian.
     each: u64,
     most: u64,
 }
@@ -86,17 +86,18 @@ impl Pixels {
     }
 }
 
-/// What looking at a scene gave, for several files of it.
+/// The views of a scene and its sensitivity, for several files of the scene.
 #[derive(Debug, Clone)]
 pub struct Looked {
     /// The views.
     pub views: PackingViews,
-    /// What they measured.
+    /// The sensitivity that the views measured.
     pub sensitivity: Sensitivity,
 }
 
 impl Looked {
-    /// Looks at `splats` from `cameras`, or from `viewpoints`. `progress` can cancel.
+    /// Chooses views of `splats`, and measures its sensitivity from them. The views are `cameras`, or else those of
+    /// `viewpoints`. `progress` can cancel.
     ///
     /// # Errors
     /// As [`PackingViews::given`], [`PackingViews::generated`] and [`PackingViews::sensitivity`].
@@ -116,7 +117,8 @@ impl Looked {
     }
 }
 
-/// Finds at most `count` views of `splats` that are like photographs, as those that judge a packed file without cameras.
+/// Finds at most `count` views of `splats` that are like photographs. A search of the same kind finds the views that judge
+/// a packed file without cameras.
 ///
 /// # Errors
 /// As [`PackingViews::found`].
@@ -130,21 +132,21 @@ pub fn judging_views(
     Ok(find(renderer, splats, more, [count, count], progress)?.judges)
 }
 
-/// Views from all around `splats`.
+/// Returns views from all around `splats`.
 fn around(splats: &Splats) -> Vec<Camera> {
     let (least, most) = (*GENERATED_VIEWS.start(), *GENERATED_VIEWS.end());
     let views = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(least, most);
     surround(&splats.geometry, views, GENERATED_SIZE, GENERATED_DISTANCES)
 }
 
-/// The numbers of found views of `splats` that measure and that judge.
+/// Returns the numbers of found views of `splats` for measuring and for judging.
 fn found_views(splats: &Splats) -> [usize; 2] {
     let views = (splats.len() / GAUSSIANS_OF_A_VIEW).clamp(*FOUND_VIEWS.start(), *FOUND_VIEWS.end());
     let measuring = views.max(splats.len() / GAUSSIANS_OF_A_LARGE_VIEW).min(MOST_FOUND_VIEWS);
     [measuring, (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end())]
 }
 
-/// The views that packing draws.
+/// The views that packing draws: some measure the sensitivity, some judge the result.
 #[derive(Debug, Clone)]
 pub struct PackingViews {
     measuring: Vec<Camera>,
@@ -155,8 +157,8 @@ pub struct PackingViews {
 }
 
 impl PackingViews {
-    /// Finds views of `splats` that are like photographs, with `renderer`. Half of those that measure are views from
-    /// all around, so that nothing is left out.
+    /// Finds views of `splats` that are like photographs, with `renderer`. Views from all around measure too, so that no
+    /// Gaussian is without views.
     ///
     /// # Errors
     /// [`Error::Codec`] if `progress` cancels. On a GPU [`Error::Render`] if the scene or a view does not fit.
@@ -169,7 +171,8 @@ impl PackingViews {
         Ok(Self { measuring, judging: judges, even: Vec::new(), given: false })
     }
 
-    /// [`Self::found`] of a part of a scene, whose Gaussians are in the order of a curve. [`EVEN_VIEWS`] more measure.
+    /// Finds views of a part of a scene, whose Gaussians are in the order of a curve: those of [`Self::found`], and [`EVEN_VIEWS`]
+    /// evenly spread over the Gaussians.
     pub(crate) fn found_of_part(
         renderer: &mut Renderer,
         part: &Splats,
@@ -188,8 +191,8 @@ impl PackingViews {
         Ok(views)
     }
 
-    /// Views of `splats` from `viewpoints`: half of the views that measure and all views that
-    /// judge are around an object, or inside a room. The other half is from all around.
+    /// Generates views of `splats` from `viewpoints`. Half of the views that measure, and all views that judge, are around
+    /// an object or inside a room. The other half of the views that measure is from all around.
     ///
     /// # Errors
     /// As [`Self::found`], which finds the views if `viewpoints` is [`Viewpoints::Auto`].
@@ -207,20 +210,20 @@ impl PackingViews {
         };
         let mut measuring: Vec<Camera> = around(splats).into_iter().step_by(2).collect();
         measuring.extend(views(&splats.geometry, measuring.len(), width, height));
-        // A number of its own, so that most of these are not among those that measure.
+        // The number differs from that of the measuring views, so that most views are not among those.
         let judging = views(&splats.geometry, JUDGES - 1, width, height);
         Ok(Self { measuring, judging, even: Vec::new(), given: false })
     }
 
-    /// Views that were found before.
+    /// Returns views that an earlier search found.
     pub(crate) fn of_found(measuring: Vec<Camera>, judging: Vec<Camera>) -> Self {
         Self { measuring, judging, even: Vec::new(), given: false }
     }
 
-    /// Takes the given cameras. If some are marked as training cameras, takes only those.
+    /// Takes the given cameras. If some cameras are marked as training cameras, takes only those.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there are fewer than two.
+    /// [`Error::Parameter`] if fewer than two cameras remain.
     pub fn given(cameras: &[Camera]) -> Result<Self> {
         let marked = cameras.iter().any(|c| c.split == Some(Split::Train));
         let used: Vec<&Camera> =
@@ -235,31 +238,31 @@ impl PackingViews {
         Ok(Self { measuring, judging, even: Vec::new(), given: true })
     }
 
-    /// Whether the cameras were given. Otherwise they were generated.
+    /// Returns whether the cameras were given. Otherwise they were generated.
     #[must_use]
     pub fn are_given(&self) -> bool {
         self.given
     }
 
-    /// The views that measure the sensitivity. If they were given, [`Self::sensitivity`] adds some from beside them.
+    /// Returns the views that measure the sensitivity. If they were given, [`Self::sensitivity`] adds views beside them.
     #[must_use]
     pub fn measuring(&self) -> &[Camera] {
         &self.measuring
     }
 
-    /// The views that judge.
+    /// Returns the views that judge.
     #[must_use]
     pub fn judging(&self) -> &[Camera] {
         &self.judging
     }
 
-    /// At most `most` of the views that judge, evenly spread. Of sharp pictures they draw some squares.
+    /// Returns at most `most` of the views that judge, evenly chosen. Of sharp pictures only some squares are drawn.
     #[must_use]
     pub fn some_judging(&self, most: usize) -> Vec<Camera> {
         self.judging_by(most, JUDGED_PIXELS)
     }
 
-    /// [`Self::some_judging`] of a part of a scene, which draw fewer pixels.
+    /// Returns views that judge a part of a scene, like [`Self::some_judging`]. They draw fewer pixels.
     pub(crate) fn judging_part(&self) -> Vec<Camera> {
         self.judging_by(PART_JUDGES, PART_JUDGED_PIXELS)
     }
@@ -274,8 +277,9 @@ impl PackingViews {
         sampled(some.cloned().collect(), pixels)
     }
 
-    /// Up to `most` points that stand for the positions of the views like photographs: first points far from each other, and
-    /// of the positions nearest to each of them the one in the middle.
+    /// Returns up to `most` points that represent the positions of the views that judge. Starting points are chosen far
+    /// from each other. Each position belongs to the nearest starting point. The result has the middle position of each
+    /// group.
     pub(crate) fn viewpoints(&self, most: usize) -> Vec<[f32; 3]> {
         let mut positions: Vec<[f32; 3]> = self.judging.iter().map(|camera| camera.position).collect();
         let squared = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>();
@@ -288,7 +292,7 @@ impl PackingViews {
         let to_all =
             |of: [f32; 3], all: &[[f32; 3]]| all.iter().map(|&other| squared(of, other).sqrt()).sum::<f32>();
         let mut points: Vec<[f32; 3]> = least(&|p| to_all(p, &positions), &positions).into_iter().collect();
-        // Found views may be far away, where few photographs are taken.
+        // Some found views may be far away, where few photographs are taken.
         positions.sort_by(|&a, &b| to_nearest(a, &points).total_cmp(&to_nearest(b, &points)));
         #[expect(clippy::cast_possible_truncation, reason = "a share of a count")]
         let usual = (positions.len() as f32 * USUAL_VIEWS).ceil() as usize;
@@ -305,14 +309,15 @@ impl PackingViews {
         groups.collect()
     }
 
-    /// The views of `splats` that base colours and opacities are fitted to: some of those that measure and do not judge, evenly
-    /// spread. Beside given cameras there are some from all around, so that colours do not suit those alone.
+    /// Returns the views of `splats` to which base colours and opacities are fitted: some of the views that measure and do
+    /// not judge, evenly chosen. If cameras were given, views from all around are added, so that colours do not suit the
+    /// given cameras alone.
     #[must_use]
     pub fn fitting(&self, splats: &Splats) -> Vec<Camera> {
         self.fitting_to(splats, FITTED_PIXELS.of(splats))
     }
 
-    /// [`Self::fitting`] of a part of a scene, which is fitted to fewer pixels.
+    /// Returns views to which a part of a scene is fitted, like [`Self::fitting`]. They draw fewer pixels.
     pub(crate) fn fitting_part(&self, part: &Splats) -> Vec<Camera> {
         self.fitting_to(part, FITTED_PIXELS.of(part) / PART_FITTED_SHARE)
     }
@@ -328,9 +333,9 @@ impl PackingViews {
         sampled(views, pixels)
     }
 
-    /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result
-    /// is blended with the guess, which stands for all views that are not among these. Reports
-    /// [`Stage::Draw`](lexisplat::Stage::Draw) to `progress`, in views.
+    /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result is blended
+    /// with a guess, which stands for all other views. Reports [`Stage::Draw`](lexisplat::Stage::Draw) to `progress`, in
+    /// views.
     ///
     /// # Errors
     /// [`Error::Codec`] if `progress` cancels. On a GPU [`Error::Render`] if the scene or a view does not fit.

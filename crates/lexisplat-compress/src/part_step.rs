@@ -1,4 +1,4 @@
-//! The step that a part of a scene asks for.
+//! The quantisation step that a part of a scene needs.
 
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::{Progress, Sensitivity, Splats};
@@ -10,20 +10,22 @@ use crate::packing_views::PackingViews;
 use crate::refit::GAIN_FOUND;
 use crate::target::{DB_PER_HALVING, on_grid};
 
-/// Steps in an octave. Scores of one small scene in two units differ by up to 1 dB, which is a fifth of an octave, and finer steps
-/// would often differ too.
+/// Number of steps in an octave. Scores of one small scene in two units differ by up to 1 dB, which is a fifth of an
+/// octave. Finer steps would therefore often differ too.
 const STEPS_PER_OCTAVE: f64 = 2.0;
-/// Number of files that are made at most.
+/// Largest number of files made.
 const MOST_FILES: usize = 4;
 /// Views that are evenly spread over a part may show less than views like photographs by this many decibels.
 const EVEN_MARGIN: f64 = 1.0;
-/// Largest change of the step's binary logarithm by one file.
+/// Largest change of the binary logarithm of the step after one file.
 const MOST_MOVE: f64 = 2.0;
 
-/// Returns the factor of the usual step with which pictures of `part` have about `decibels`. The part is packed as a scene of its
-/// own, by `views` and the `sensitivity` that they measure. A file at one step says what the next step is, until a file keeps its
-/// step. No file is refitted: [`GAIN_FOUND`] stands for the gain of refitting. With a second file that is refitted, and steps of
-/// quarter octaves, three copies of room-large in five parts had the same steps, in 27 % more time.
+/// Returns the factor on the usual step with which pictures of `part` have a PSNR of about `decibels`.
+///
+/// The part is packed as a scene of its own, with `views` and their `sensitivity`. The score of a file at one step gives
+/// the next step, until the step stays the same. No file is refitted: [`GAIN_FOUND`] stands for the gain of refitting. With
+/// a second file that is refitted, and steps of quarter octaves, three copies of room-large in five parts had the same
+/// steps, in 27 % more time.
 ///
 /// # Errors
 /// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -38,7 +40,7 @@ pub(crate) fn step_factor(
     let packer = Packer::new(part, sensitivity, options)?;
     let usual = libm::log2(packer.step_for(decibels));
     let gain = if options.may_change() { GAIN_FOUND } else { 0.0 };
-    // A GPU that looks need not judge too.
+    // The processor judges, also if a GPU measured the sensitivity.
     let mut judge = Judge::of_part(Renderer::cpu(), part, &views.judging_part(), progress)?;
     let even = views.judging_evenly();
     let mut evenly =

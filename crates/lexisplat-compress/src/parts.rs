@@ -1,4 +1,4 @@
-//! Packing of a scene part by part, each drawn as if it were the whole scene.
+//! Packs a scene part by part. Each part is drawn as if it were the whole scene.
 
 use lexisplat::packed::{Appearance, PackOptions};
 use lexisplat::stream::{self, Observed, Observer};
@@ -14,8 +14,8 @@ use crate::refit::Fit;
 use crate::report::CompressionReport;
 use crate::tiles;
 
-/// Packs to about `decibels` part by part, or as a whole a scene that is one part. `renderer` draws the parts. Without one, the
-/// weights of Gaussians are guessed.
+/// Packs part by part to a PSNR of about `decibels`. A scene that is one part is packed whole. `renderer` draws the parts.
+/// If it is `None`, the sensitivity is guessed.
 ///
 /// # Errors
 /// As [`stream::pack`], and errors of drawing.
@@ -70,9 +70,10 @@ impl Observer<Error> for Parts<'_> {
     }
 }
 
-/// Draws `part` of a scene from views like photographs of it and from all around. The result has the sensitivity of these pictures,
-/// the step with which the part has about `decibels`, and the views as the memo. A part without Gaussians has no views. With views
-/// from all around alone, files of the same size were 1.7 dB worse (docs/results/scale.md).
+/// Draws `part` of a scene from views like photographs of the part and from views all around it. The result has the
+/// sensitivity of these pictures, the step factor with which the part has a PSNR of about `decibels`, and the views as the
+/// memo. A part without Gaussians has no views. With views from all around alone, files of the same size were 1.7 dB worse
+/// (docs/results/scale.md).
 ///
 /// # Errors
 /// [`lexisplat::Error::Cancelled`] within [`Error::Codec`]; on a GPU [`Error::Render`] if the part does not fit.
@@ -86,7 +87,7 @@ pub(crate) fn observe(
     if part.is_empty() {
         return Ok(Sensitivity::default().into());
     }
-    // The work around it counts Gaussians.
+    // The surrounding work reports progress in Gaussians, not in views.
     let progress = &OnlyCancels(progress);
     let views = PackingViews::found_of_part(renderer, part, progress)?;
     let sensitivity = views.sensitivity(renderer, part, progress)?;
@@ -94,8 +95,8 @@ pub(crate) fn observe(
     Ok(Observed { sensitivity, step_factor, memo: memo_of(&views) })
 }
 
-/// Base colours and opacities of `model`, which is what a file has of `part`, fitted to pictures of the part alone. `memo` is that
-/// of [`observe`].
+/// Returns base colours and opacities of `model` that are fitted to pictures of `part` alone. `model` is the decoded file
+/// of `part`. `memo` is the memo of [`observe`].
 ///
 /// # Errors
 /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`Error::Codec`].

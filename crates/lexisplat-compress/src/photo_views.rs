@@ -1,27 +1,29 @@
-//! Views from about where photographs of a scene were taken.
+//! Views from likely places of photographs of a scene.
 //!
-//! Two signs tell of a place whether photographs were taken from there: view-dependent colours
-//! ([`ObservedDirections`](crate::observed_directions::ObservedDirections)), and sizes, which are about in proportion to the distance
-//! ([`Sizes`](crate::size_spread::Sizes)).
+//! Two signs tell whether photographs were taken from a place: view-dependent colours
+//! ([`ObservedDirections`](crate::observed_directions::ObservedDirections)), and sizes of Gaussians, which are about
+//! proportional to the distance ([`Sizes`](crate::size_spread::Sizes)).
 
 use lexisplat_render::{Camera, PLASTIC};
 
 use crate::observed_directions::{ObservedDirections, Seen};
 use crate::size_spread::SizesSeen;
 
-/// Directions that are tried at each place.
+/// Number of directions that are tried at each place.
 const DIRECTIONS: usize = 24;
-/// Cosine of half the angle that a picture is taken to show: 32 degrees.
+/// Cosine of half the angle that a picture is assumed to show: 32 degrees.
 const CONE: f32 = 0.85;
-/// Natural logarithm of the median size of Gaussians over their distance, as seen from where photographs were taken, and how far
-/// from it counts as well. It is -5.4 to -4.2 (seven models of three trainers, pictures of 400 to 1,200 pixels).
+/// The usual natural logarithm of the median size of Gaussians over their distance, as seen from places of photographs, and
+/// the largest difference from it that counts as usual. The logarithm is -5.4 to -4.2 (seven models of three trainers,
+/// pictures of 400 to 1,200 pixels).
 const USUAL_SIZE: f64 = -5.0;
 const USUAL_RANGE: f64 = 0.9;
-/// A direction whose y is larger than this needs another up than the world's.
+/// Largest absolute y of a direction for which the world's up can be used.
 const STEEP: f64 = 0.95;
 
-/// How likely photographs were taken from `position`, from where sizes are `sizes`: larger is likelier. The three terms are each
-/// about 1 apart between places of photographs and others, and have equal weights.
+/// Returns a score of how likely photographs were taken from `position`; larger is likelier. `sizes` are the sizes as seen
+/// from there. The score has three terms with equal weights. Each differs by about 1 between places of photographs and
+/// other places.
 pub(crate) fn likelihood(observed: &ObservedDirections, position: [f32; 3], sizes: &SizesSeen) -> f64 {
     let (mut focus, mut count) = (0.0, 0.0);
     for seen in observed.from(position) {
@@ -33,7 +35,8 @@ pub(crate) fn likelihood(observed: &ObservedDirections, position: [f32; 3], size
     if likelihood.is_finite() { likelihood } else { f64::NEG_INFINITY }
 }
 
-/// `camera`, the `number`-th, turned to what seems to have been seen from its place. It stays as it is if nothing does.
+/// Returns `camera`, the `number`-th, turned to the Gaussians that seem to have been seen from its place. If there are
+/// none, the camera stays as it is.
 pub(crate) fn turned(camera: &Camera, number: usize, observed: &ObservedDirections) -> Camera {
     let seen: Vec<Seen> = observed.from(camera.position).collect();
     let dot = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f32>();
@@ -54,7 +57,8 @@ pub(crate) fn turned(camera: &Camera, number: usize, observed: &ObservedDirectio
     if turned.validate().is_ok() { turned } else { camera.clone() }
 }
 
-/// The rotation of a camera that looks `forward`, a unit vector, and is upright in a world whose y points down.
+/// Returns the rotation of a camera that looks along `forward`, a unit vector, and is upright in a world whose y points
+/// down.
 fn facing(forward: [f32; 3]) -> [[f32; 3]; 3] {
     let forward = forward.map(f64::from);
     let down = if forward[1].abs() > STEEP { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };

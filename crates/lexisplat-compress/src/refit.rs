@@ -1,8 +1,8 @@
 //! Fits the base colours and opacities of a packed scene to the pictures of the original.
 //!
-//! Pictures are linear in base colours, and nearly so in small changes of opacities. So what removal and quantisation do
-//! to pictures is made up for by a linear least-squares problem, which the method of conjugate gradients solves through
-//! the renderer and its adjoint (docs/METHOD.md, "Refitting").
+//! Pictures are linear in base colours, and nearly linear in small changes of opacities. A linear least-squares problem
+//! therefore gives the colours and opacities that make up for removal and quantisation. The method of conjugate gradients
+//! solves the problem with the renderer and its adjoint (docs/METHOD.md, "Refitting").
 
 use std::borrow::Borrow;
 
@@ -17,28 +17,28 @@ use crate::error::Result;
 use crate::only_cancels::OneStep;
 use crate::solve::{ROW, kinds, solve};
 
-/// Steps of the method of conjugate gradients, with given cameras and with views that were found. Each takes about as
-/// long as drawing all views. More steps gain less where other views than the fitted ones count (docs/METHOD.md).
+/// Number of conjugate-gradient steps with given cameras and with found views. Each step takes about as long as drawing all
+/// views. More steps gain less on other views than the fitted ones (docs/METHOD.md).
 const STEPS_GIVEN: usize = 5;
 const STEPS_FOUND: usize = 3;
-/// Weight of the distance to the colours and opacities before, as a share of a Gaussian's weight in pictures. Other views
-/// than those that are fitted to depend on them too.
+/// Weight of the distance to the colours and opacities before the fit, as a multiple of a Gaussian's weight in pictures.
+/// The term is there because other views than the fitted ones depend on these values too.
 const RIDGE: f32 = 0.5;
-/// Multiple of the diagonal of the matrix in the preconditioner of opacities.
+/// Factor on the diagonal of the matrix in the preconditioner of opacities.
 const OPACITY_DIAGONAL: f32 = 4.0;
-/// Largest change of the logarithm of an opacity. Pictures are nearly linear only in small ones.
+/// Largest change of the logarithm of an opacity. Pictures are nearly linear only in small changes.
 const MOST_LOG_OPACITY: f32 = 0.5;
-/// By how much refitting raises the judged quality, in dB, about: with given cameras and with views that were found.
+/// Approximate gain of the judged quality by refitting, in dB, with given cameras and with found views.
 const GAIN_GIVEN: f64 = 4.0;
 pub(crate) const GAIN_FOUND: f64 = 0.8;
 
-/// A packer whose files are refitted, if that is allowed.
+/// A packer whose files are refitted, if refitting is allowed.
 pub(crate) struct Refitting<S> {
     packer: Packer<S>,
     fit: Option<Fit>,
 }
 
-/// What base colours and opacities are fitted to.
+/// The views and pictures to which base colours and opacities are fitted.
 pub(crate) struct Fit {
     cameras: Vec<Camera>,
     /// The original's pictures.
@@ -48,32 +48,33 @@ pub(crate) struct Fit {
 }
 
 impl<S: Borrow<Splats>> Refitting<S> {
-    /// Files of `packer`, with base colours and opacities as `fit` says or as `packer` makes them.
+    /// Returns files of `packer`. If there is a `fit`, their base colours and opacities are fitted to it; otherwise they
+    /// are those of `packer`.
     pub(crate) fn new(packer: Packer<S>, fit: Option<Fit>) -> Self {
         Self { packer, fit }
     }
 
-    /// Number of Gaussians of the scene.
+    /// Returns the number of Gaussians of the scene.
     pub(crate) fn len(&self) -> usize {
         self.packer.len()
     }
 
-    /// Whether files are refitted.
+    /// Returns whether files are refitted.
     pub(crate) fn refits(&self) -> bool {
         self.fit.is_some()
     }
 
-    /// By how much files are expected to be better than they are before they are refitted, in dB.
+    /// Returns the expected gain of the judged quality by refitting, in dB.
     pub(crate) fn gain(&self) -> f64 {
         self.fit.as_ref().map_or(0.0, |fit| if fit.given { GAIN_GIVEN } else { GAIN_FOUND })
     }
 
-    /// The overall step for pictures of about this PSNR, in dB.
+    /// Returns the overall step for pictures of about this PSNR, in dB, after refitting.
     pub(crate) fn step_for(&self, decibels: f64) -> f64 {
         self.packer.step_for(decibels - self.gain())
     }
 
-    /// Packs with an overall step, with or without a `floor` under what is visible, and does not refit.
+    /// Packs at an overall `step`, without refitting. `floor` tells whether visible Gaussians keep a least precision.
     ///
     /// # Errors
     /// Errors of packing.
@@ -88,7 +89,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         Ok((quantised, first))
     }
 
-    /// Refits a file of `quantised`, if that is allowed. Its first layer alone is not fitted yet.
+    /// Refits a file of `quantised`, if refitting is allowed. The pictures of its first layer alone are not fitted yet.
     ///
     /// # Errors
     /// Errors of packing and drawing.
@@ -107,7 +108,8 @@ impl<S: Borrow<Splats>> Refitting<S> {
         Ok(Refitted { shown: Some(shown), file })
     }
 
-    /// Fits the first layer alone of a file of `quantised`, if there is one. The whole scene stays as it is.
+    /// Fits the pictures of the first layer alone of a file of `quantised`, if it has a first layer. The whole scene stays
+    /// the same.
     ///
     /// # Errors
     /// Errors of packing and drawing.
@@ -125,7 +127,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         Ok(quantised.finish(Some(&shown), Some(&changes), progress)?)
     }
 
-    /// Packs with an overall step: [`Self::quantise`], [`Self::refit`] and [`Self::complete`].
+    /// Packs at an overall `step`: calls [`Self::quantise`], [`Self::refit`] and [`Self::complete`].
     ///
     /// # Errors
     /// Errors of packing and drawing.
@@ -143,21 +145,21 @@ impl<S: Borrow<Splats>> Refitting<S> {
 
 /// A file with refitted base colours and opacities.
 pub(crate) struct Refitted {
-    /// Those colours and opacities; `None` if nothing is left to fit.
+    /// The fitted colours and opacities; `None` if nothing is left to fit.
     shown: Option<Vec<Appearance>>,
     pub(crate) file: (Packed, CompressReport),
 }
 
 impl Refitted {
-    /// A file of which nothing is left to fit.
+    /// Wraps a file of which nothing is left to fit.
     pub(crate) fn complete(file: (Packed, CompressReport)) -> Self {
         Self { shown: None, file }
     }
 }
 
 impl Fit {
-    /// Pictures of `splats` from `cameras` to fit to. The cameras were `given`, or else found. The processor draws them, for it fits
-    /// too.
+    /// Draws pictures of `splats` from `cameras`, to fit to. `given` tells whether the cameras were given or found. The
+    /// processor draws, because it also fits.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -172,8 +174,8 @@ impl Fit {
         Ok(Self { cameras, targets, given })
     }
 
-    /// Base colours and opacities of `scene` with which its pictures are nearest to the targets. `weights` are the
-    /// sensitivities of its Gaussians to the colour and to the logarithm of the opacity.
+    /// Returns the base colours and opacities of `scene` with which its pictures are nearest to the targets. `weights` has
+    /// for each Gaussian the sensitivities of the pictures to its colour and to the logarithm of its opacity.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -190,7 +192,7 @@ impl Fit {
         let parts = &OneStep(progress);
         let PictureErrors { errors, row_sums, opacity_squares, .. } =
             adjoint.of_errors(&self.targets, parts)?;
-        // Sensitivities are averaged over three channels, and products with the adjoint are not.
+        // Sensitivities are means over three channels, and products with the adjoint are sums. Hence the factor 3.
         let ridge: Vec<GaussianChange<4>> =
             weights.iter().map(|w| kinds(w.map(|w| RIDGE * 3.0 * w))).collect();
         let mut diagonal = Vec::with_capacity(ridge.len());
@@ -205,7 +207,7 @@ impl Fit {
     }
 }
 
-/// What Gaussian `i` shows after a change.
+/// Returns the appearance of Gaussian `i` after a change.
 fn changed(geometry: &Geometry, i: usize, change: &GaussianChange<4>) -> Appearance {
     let Appearance { dc, log_opacity } = Appearance::of(geometry, i);
     let more = change[3].clamp(-MOST_LOG_OPACITY, MOST_LOG_OPACITY);

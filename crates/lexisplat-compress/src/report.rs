@@ -1,4 +1,4 @@
-//! What a compression did: the facts that programs print as text and as JSON.
+//! The report of a compression: the facts that programs print as text and as JSON.
 
 use lexisplat::packed::{PackedHead, ReachedRecord, TargetRecord};
 use lexisplat::stream::Compressed;
@@ -9,18 +9,19 @@ use crate::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
 use crate::judge::{Judge, Score};
 use crate::target::MIN_PSNR;
 
-/// A view worse than the judged quality by more than this, in dB, is a sign of views unlike photographs. Ten models had
-/// at most 4.2 at the default preset (docs/results/promise.md), and a courtyard whose views stood outside its walls 11.
+/// Largest usual difference of the judged quality and the worst view, in dB. A larger difference is a sign of views unlike
+/// photographs. Ten models had at most 4.2 at the default preset (docs/results/promise.md), and a courtyard whose views
+/// stood outside its walls 11.
 const WIDE_SPREAD: f64 = 8.0;
-/// A mean above the worst view by more than this, in dB, means a file much larger than one of the same mean. At
-/// `--min-psnr 38` six models without cameras have 1.1 to 5.5, with cameras 0.4 to 2.6; flowers has 6.6 and fruit-drops
-/// 8.2 without.
+/// Largest usual difference of the mean of all views and the worst view, in dB. With a larger difference the file is much
+/// larger than one of the same mean PSNR. At `--min-psnr 38` six models without cameras have 1.1 to 5.5, with cameras 0.4
+/// to 2.6. Without cameras flowers has 6.6 and fruit-drops 8.2.
 const MUCH_ABOVE: f64 = 6.0;
 
-/// What a compression did.
+/// The result of a compression, apart from the file.
 ///
-/// Serialized, it is the JSON report of `lexisplat compress`. The keys are the names of the fields, but for the
-/// fields that are renamed.
+/// Serialised, it is the JSON report of `lexisplat compress`. The keys are the names of the fields, except for renamed
+/// fields.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct CompressionReport {
@@ -33,14 +34,14 @@ pub struct CompressionReport {
     /// Layout of the file.
     #[serde(serialize_with = "name")]
     pub layout: Layout,
-    /// How the file was made, and its errors. The keys are those of [`RecordReport`].
+    /// How the file was made, and its errors. The keys are the fields of [`RecordReport`].
     #[serde(flatten, serialize_with = "record")]
     pub record: Record,
-    /// Mean number of nonzeros of a Gaussian. An escape counts as a full vector.
+    /// Mean number of nonzeros of a Gaussian. An escape counts as a vector without zeros.
     pub mean_nonzeros: f64,
-    /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` if there are no nonzeros.
+    /// The paper's ratio: number of SH-rest coefficients over the mean number of nonzeros. `None` if there are no nonzeros.
     pub coefficient_ratio: Option<f64>,
-    /// Number of Gaussians by number of nonzeros, from 0 to the dimension, without escapes.
+    /// Number of Gaussians for each number of nonzeros, from 0 to the dimension, without escapes.
     pub nonzero_histogram: Vec<u64>,
     /// Number of Gaussians whose SH are stored exactly.
     pub escapes: u64,
@@ -49,19 +50,19 @@ pub struct CompressionReport {
     pub source_bytes: u64,
     /// Size of the file, in bytes.
     pub file_bytes: u64,
-    /// Bytes of the file that stand for SH-rest.
+    /// Bytes of the file that hold SH-rest.
     #[serde(serialize_with = "eighths")]
     pub sh_bytes: f64,
-    /// Bytes of the same SH-rest as dense f32.
+    /// Bytes of the same SH-rest as dense `f32` values.
     pub dense_sh_bytes: u64,
-    /// Bytes of each part of the file by name, as [`part_bytes`] gives them.
+    /// Bytes of each part of the file by name, as returned by [`part_bytes`].
     #[serde(serialize_with = "map")]
     pub attribute_bytes: Vec<(String, f64)>,
-    /// What was asked and reached, if the quality was a target.
+    /// The target asked for and the values reached, if the quality was a target.
     pub target: Option<TargetRecord>,
-    /// What the file shows of the scene, if views judged it.
+    /// The PSNR that the file reaches, if views judged it.
     pub reached: Option<ReachedRecord>,
-    /// What the sensitivity comes from. `None` if the geometry is exact, which needs none.
+    /// Origin of the sensitivity. `None` if the geometry is exact, because no sensitivity is needed then.
     pub sensitivity: Option<SensitivitySource>,
     /// The GPU that measured the sensitivity, or `cpu`. `None` if the geometry is exact.
     pub device: Option<String>,
@@ -69,11 +70,11 @@ pub struct CompressionReport {
     pub removed: u64,
     /// Whether a packed scene was measured and packed part by part.
     pub in_parts: bool,
-    /// Rounds of learning. `None` if the dictionary was given or the file is packed, as the next two.
+    /// Number of rounds of learning. `None` if the dictionary was given or the file is packed. So are the next two fields.
     pub learn_rounds: Option<usize>,
     /// Number of Gaussians that the dictionary was learned from.
     pub learn_sample: Option<usize>,
-    /// Mean nonzeros of Gaussians that were not learned from.
+    /// Mean number of nonzeros of Gaussians from which the dictionary was not learned.
     pub held_out_nonzeros: Option<f64>,
     /// Seconds spent reading the source.
     pub read_seconds: f64,
@@ -83,36 +84,36 @@ pub struct CompressionReport {
     pub learn_seconds: f64,
     /// Seconds spent coding and verifying.
     pub code_seconds: f64,
-    /// Seconds spent on learning, coding and all else that makes a file of a scene.
+    /// Seconds spent on all steps that make a file of a scene, learning and coding among them.
     pub pack_seconds: f64,
     /// Seconds spent writing the file.
     pub write_seconds: f64,
     /// Seconds spent in all.
     pub total_seconds: f64,
-    /// What is odd about the source, one sentence each.
+    /// Oddities of the source, one sentence each.
     pub warnings: Vec<String>,
     /// The dictionary of a file with exact geometry.
     #[serde(skip)]
     pub dictionary: Option<Dictionary>,
 }
 
-/// By how much the worst view falls short of the judged quality, in dB, if that is so much that photographs may be as
-/// hard as that view. `None` if the views were given, for then they are what counts.
+/// Returns by how much the worst view falls short of the judged quality, in dB, if this exceeds 8 dB: photographs may then
+/// be as hard as that view. Returns `None` for a smaller difference, and for given views, because those are what counts.
 #[must_use]
 pub fn uncertain_by(reached: &ReachedRecord) -> Option<f64> {
     let below = reached.judged_psnr - reached.min_psnr;
     (!reached.cameras && below > WIDE_SPREAD).then_some(below)
 }
 
-/// By how much the mean of all views exceeds the worst one, in dB, if a file whose every view shall have a quality spends
-/// much on few of them. `None` if it does not, or was made for another target.
+/// Returns by how much the mean of all views exceeds the worst view, in dB, if the target is a least PSNR of each view and
+/// this exceeds 6 dB: the file then spends much on few views. Returns `None` otherwise.
 #[must_use]
 pub fn overshoot(target: &TargetRecord) -> Option<f64> {
     let above = target.mean_psnr - target.min_psnr;
     (target.kind == MIN_PSNR && above > MUCH_ABOVE).then_some(above)
 }
 
-/// What `judge` says of a file.
+/// Returns the record of a score by `judge`.
 pub(crate) fn reached(score: Score, judge: &Judge) -> ReachedRecord {
     let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
     let psnr = [score.judged, score.mean, score.least].map(rounded_decibels);
@@ -124,18 +125,18 @@ fn rounded_decibels(decibels: f64) -> f64 {
     (decibels * 1000.0).round() / 1000.0
 }
 
-/// What the sensitivity of a scene comes from.
+/// Origin of the sensitivity of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SensitivitySource {
-    /// Views of the scene were drawn.
+    /// Measured in drawn views of the scene.
     Views,
-    /// Each Gaussian was judged alone.
+    /// Guessed from each Gaussian alone.
     Guess,
 }
 
 impl CompressionReport {
-    /// Returns what the reports of all layouts have in common.
+    /// Returns the part of a report that all layouts have in common.
     fn new(
         layout: Layout,
         gaussians: usize,
@@ -175,7 +176,7 @@ impl CompressionReport {
         Self { atoms: dictionary.len(), write_seconds, dictionary: Some(dictionary), ..shared }
     }
 
-    /// Returns the report of a packed file, whose tensors take the bytes in `tensors`.
+    /// Returns the report of a packed file. `tensors` has the bytes of each tensor.
     pub(crate) fn packed(
         head: &PackedHead,
         report: &CompressReport,
@@ -203,7 +204,7 @@ fn record<S: Serializer>(record: &Record, serializer: S) -> Result<S::Ok, S::Err
     RecordReport::from(record).serialize(serializer)
 }
 
-/// Streams are not whole bytes; sums of their bits are exact to an eighth of one.
+/// Rounds bytes to an eighth. Streams need not be whole bytes; the sums of their bits are exact to an eighth of a byte.
 fn rounded(bytes: f64) -> ByteCount {
     ByteCount::from((bytes * 8.0).round() / 8.0)
 }

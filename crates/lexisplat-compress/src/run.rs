@@ -20,29 +20,29 @@ use crate::views::Viewpoints;
 
 /// Bytes of a Gaussian in a PLY at SH degree 3.
 const PLY_ROW: u64 = 248;
-/// Views that judge a preset, at most.
+/// Largest number of views that judge a preset.
 const PRESET_JUDGES: usize = 48;
 
 impl Compression {
-    /// Whether [`Self::run`] holds all Gaussians of a PLY of `bytes` bytes and SH degree 3 at once, with or without
-    /// [likely cameras](Self::with_likely_cameras). Such a source is best opened with
-    /// [`PlySource::open_whole`](lexisplat::ply::PlySource::open_whole).
+    /// Returns whether [`Self::run`] holds all Gaussians of a PLY of `bytes` bytes and SH degree 3 in memory at once.
+    /// `likely_cameras` tells whether there are [likely cameras](Self::with_likely_cameras). Such a source is best opened
+    /// with [`PlySource::open_whole`](lexisplat::ply::PlySource::open_whole).
     #[must_use]
     pub fn holds_whole(&self, bytes: u64, likely_cameras: bool) -> bool {
         let is_whole = |packing: &Packing| packing.is_whole(bytes / PLY_ROW, bytes, likely_cameras);
         matches!(self, Self::Packed(packing) if is_whole(packing).is_ok_and(|whole| whole))
     }
 
-    /// Compresses `source` into `sink`: a file that appears when it is whole, or any writer. `progress` is told
-    /// of every step and may cancel. Nothing is left of a file that was cancelled.
+    /// Compresses `source` into `sink`: a file that appears when it is whole, or any writer. Reports every step to
+    /// `progress`, which can cancel. A cancelled compression leaves no file.
     ///
-    /// The result is the same for any number of threads. Of a packed file it depends on the memory only in
-    /// whether the scene is packed whole.
+    /// The result is the same for any number of threads. A packed file depends on the memory allowed only in whether the
+    /// scene is packed whole.
     ///
     /// # Errors
-    /// [`Error::Parameter`](crate::Error::Parameter) for choices out of range or that do not go together, for a target
-    /// that cannot be met, and for a source without Gaussians. [`Error::Memory`](crate::Error::Memory) if a choice needs the whole scene
-    /// and memory does not allow it. Errors of the source, of the sink and of a GPU.
+    /// [`Error::Parameter`](crate::Error::Parameter) for choices that are out of range or do not go together, for a target
+    /// that cannot be met, and for a source without Gaussians. [`Error::Memory`](crate::Error::Memory) if a choice needs
+    /// the whole scene and the memory allowed is too small. Errors of the source, of the sink and of a GPU.
     /// [`Error::Codec`](crate::Error::Codec) with [`lexisplat::Error::Cancelled`] if `progress` cancels.
     pub fn run<'a>(
         &self,
@@ -76,7 +76,8 @@ impl Compression {
     }
 }
 
-/// Points of view that a file's base colours are seen from. More of them gained nothing (docs/METHOD.md, "Layers").
+/// Number of viewpoints from which the base colours of a file are evaluated. More viewpoints gained nothing
+/// (docs/METHOD.md, "Layers").
 const VIEWPOINTS: usize = 8;
 
 impl Packing {
@@ -93,8 +94,8 @@ impl Packing {
         }
     }
 
-    /// Whether `source` is packed whole, with or without cameras that belong to it. Compressed sources count with the bytes of
-    /// their Gaussians.
+    /// Returns whether `source` is packed whole. `cameras` tells whether cameras belong to it. A compressed source counts
+    /// with the bytes of its Gaussians.
     ///
     /// # Errors
     /// As [`Self::is_whole`].
@@ -116,7 +117,7 @@ impl Packing {
         in_parts(&self.options, self.decibels()?, Some(self.renderer()?), source, sink, progress)
     }
 
-    /// The cameras that were given, or those that are likely and seem to belong to `splats`.
+    /// Returns the given cameras, or else likely cameras that seem to belong to `splats`.
     fn cameras_of(
         &self,
         renderer: &mut Renderer,
@@ -182,7 +183,7 @@ impl Packing {
         let refitting = Refitting::new(packer, fit);
         let (packed, report, judge, score) = match self.quality {
             Quality::Preset(preset) => {
-                // What is left out to keep a limit is not what a preset can make up for.
+                // A preset cannot make up for Gaussians that a limit removes, so it is judged against the reduced scene.
                 let judges = views.some_judging(PRESET_JUDGES);
                 let mut judge = Judge::new(renderer, packed_scene, &judges, given, progress)?;
                 let (packed, report, mut score) = pack_to_preset(&refitting, &mut judge, preset, progress)?;
@@ -217,7 +218,8 @@ impl Packing {
     }
 }
 
-/// Name of the GPU that `renderer` draws on, if it does. The results of a GPU are its own, so files name it.
+/// Returns the name of the GPU on which `renderer` draws, if it is a GPU. Files record the name, because results differ
+/// between GPUs.
 fn gpu(renderer: &Renderer) -> Option<String> {
     renderer.is_gpu().then(|| renderer.name().to_owned())
 }

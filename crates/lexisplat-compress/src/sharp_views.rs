@@ -1,22 +1,23 @@
-//! Parts of sharp pictures, which stand for the whole of them.
+//! Squares of sharp pictures, which stand for whole pictures.
 //!
-//! A picture as sharp as people look at has so many pixels that drawing all of every view takes minutes. Whole pictures with
-//! fewer pixels show another scene: small Gaussians blur, and errors of them average out. So some squares of each sharp
-//! picture are drawn. They lie evenly over it, and at other places in the next view. The mean squared error over them is, on
-//! average over all places, that of whole pictures.
+//! Sharp pictures have so many pixels that drawing all of every view takes minutes. Whole pictures of fewer pixels show
+//! another scene: small Gaussians blur, and their errors average out. Some squares of each sharp picture are therefore
+//! drawn. The squares lie evenly over a picture, and at other places in the next view. On average over all places, the mean
+//! squared error of the squares is the mean squared error of whole pictures.
 
 use lexisplat_render::conventions::TILE;
 use lexisplat_render::{Camera, PLASTIC, TileSet};
 
-/// Side of a square, in tiles. Half the picture's size has whole tiles too.
+/// Side of a square, in tiles. Two tiles of a picture are one tile of the picture at half its size.
 const SQUARE: u32 = 2;
 /// Side of a tile, in pixels.
 #[expect(clippy::cast_possible_truncation, reason = "16")]
 const TILE_PIXELS: u32 = TILE as u32;
-/// The golden ratio less 1: the step from one view's places to those of the next.
+/// The golden ratio less 1: the step from the places of one view to those of the next.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// These cameras, which draw about `pixels` pixels in all. If that is all that they have, they draw whole pictures.
+/// Returns the cameras, restricted to squares so that they draw about `pixels` pixels in all. If their whole pictures have
+/// no more pixels, they stay as they are.
 pub(crate) fn sampled(cameras: Vec<Camera>, pixels: u64) -> Vec<Camera> {
     let all: u64 = cameras.iter().map(Camera::drawn_pixels).sum();
     if all <= pixels {
@@ -26,7 +27,7 @@ pub(crate) fn sampled(cameras: Vec<Camera>, pixels: u64) -> Vec<Camera> {
     cameras.into_iter().enumerate().map(|(k, camera)| squares_of(camera, share, k)).collect()
 }
 
-/// `camera`, the `k`-th, which draws this share of its squares.
+/// Returns `camera`, the `k`-th, restricted to this share of its squares.
 fn squares_of(camera: Camera, share: f64, k: usize) -> Camera {
     let begin = (k as f64 * GOLDEN).fract();
     let place = |x: u32, y: u32| (begin + f64::from(x) * PLASTIC[0] + f64::from(y) * PLASTIC[1]).fract();
@@ -34,7 +35,7 @@ fn squares_of(camera: Camera, share: f64, k: usize) -> Camera {
         |limit: f64| TileSet::new(camera.width, camera.height, |x, y| place(x / SQUARE, y / SQUARE) <= limit);
     let mut set = chosen(share);
     if set.tiles().is_empty() {
-        // A small picture has one square at least: the first.
+        // A small picture has at least one square: that with the lowest place.
         let squares = |side: u32| 0..side.div_ceil(SQUARE * TILE_PIXELS);
         let places = squares(camera.width).flat_map(|x| squares(camera.height).map(move |y| place(x, y)));
         set = chosen(places.fold(1.0, f64::min));

@@ -3,13 +3,13 @@
 use lexisplat::Geometry;
 use lexisplat_render::{Camera, Image, hidden_share};
 
-/// Share of pixels below which a picture shows almost nothing of a scene.
+/// Share of drawn pixels below which a picture shows almost nothing of a scene.
 const ALMOST_NOTHING: f64 = 0.02;
-/// Share of the opacity before cameras that their near planes may hide without a warning. In the models of docs/results they
-/// hide nothing.
+/// Largest share of the opacity before cameras that their near planes may hide without a warning. In the models of
+/// docs/results the near planes hide nothing.
 const HIDDEN: f64 = 0.03;
 
-/// Returns a warning if most `pictures` of the scene `model` show nothing but `background`.
+/// Returns a warning if more than half of `pictures` of the scene `model` show almost nothing but `background`.
 #[must_use]
 pub fn shows_almost_nothing(model: &str, pictures: &[Image], background: [f32; 3]) -> Option<String> {
     let is_empty = |picture: &&Image| {
@@ -24,8 +24,8 @@ pub fn shows_almost_nothing(model: &str, pictures: &[Image], background: [f32; 3
     })
 }
 
-/// Returns a warning if the near planes of `cameras` hide more than 3 % of the opacity before them: a scene in small
-/// units, drawn with the trainer's near plane.
+/// Returns a warning if the near planes of `cameras` hide more than 3 % of the opacity before them. This happens to a scene
+/// in small units that is drawn with the trainer's near plane.
 #[must_use]
 pub(crate) fn near_plane_hides(geometry: &Geometry, cameras: &[Camera]) -> Option<String> {
     let (share, near) = (hidden_share(geometry, cameras), cameras.first()?.near);

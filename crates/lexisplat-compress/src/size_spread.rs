@@ -1,16 +1,17 @@
-//! Tells from the sizes of Gaussians where photographs were taken.
+//! Estimates from the sizes of Gaussians the places from which photographs were taken.
 //!
-//! Training makes Gaussians as small as the photographs need, so that a Gaussian's size is about in proportion to its distance
-//! from the cameras. So from where photographs were taken Gaussians look more alike in size than from elsewhere.
+//! Training makes Gaussians as small as the photographs need, so the size of a Gaussian is about proportional to its
+//! distance from the cameras. From the places of photographs Gaussians therefore look more alike in size than from other
+//! places.
 
 use lexisplat::Geometry;
 
-/// Gaussians of less opacity than this, 30 %, before the sigmoid, do not count.
+/// Smallest opacity of a Gaussian that counts, 30 %, before the sigmoid.
 const FAINT: f32 = -0.85;
-/// Most Gaussians that are looked at, evenly spread over the scene's.
+/// Largest number of Gaussians that are looked at, evenly chosen.
 const ASKED: usize = 4096;
 
-/// The places and sizes of some Gaussians.
+/// The positions of some Gaussians, and the natural logarithms of their largest scales.
 pub(crate) struct Sizes(Vec<([f64; 3], f64)>);
 
 impl Sizes {
@@ -25,7 +26,7 @@ impl Sizes {
         Self(all.filter(|(place, size)| size.is_finite() && place.iter().all(|v| v.is_finite())).collect())
     }
 
-    /// The sizes as seen from `position`.
+    /// Returns the sizes as seen from `position`.
     pub(crate) fn seen_from(&self, position: [f32; 3]) -> SizesSeen {
         let position = position.map(f64::from);
         let mut sizes: Vec<f64> = (self.0.iter())
@@ -46,7 +47,7 @@ impl Sizes {
 
 /// The natural logarithms of sizes over distances, as seen from one place.
 pub(crate) struct SizesSeen {
-    /// The distance between their quartiles; infinite if there are none.
+    /// Difference of the upper and the lower quartile; infinite if there are no sizes.
     pub(crate) spread: f64,
     pub(crate) median: f64,
 }

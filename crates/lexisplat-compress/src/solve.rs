@@ -1,21 +1,22 @@
-//! Changes of Gaussians with which pictures are nearest to others, by the method of conjugate gradients.
+//! Solves for the changes of Gaussians with which pictures are nearest to targets, by the method of conjugate gradients.
 
 use lexisplat::Progress;
 use lexisplat_render::{GaussianChange, PictureAdjoint};
 
 use crate::error::Result;
 
-/// Share of the sums of rows in the preconditioner of colours. The diagonal of the matrix is smaller than those.
+/// Factor on the sums of rows in the preconditioner of colours. The diagonal of the matrix is smaller than the sums of
+/// rows.
 pub(crate) const ROW: f32 = 0.2;
 
-/// Changes that are the same for all colours: of colours, opacities and sizes.
+/// Returns a change from one value for all three colour channels, then one for the opacity and one for the size.
 pub(crate) fn kinds<const N: usize, const KINDS: usize>(of: [f32; KINDS]) -> GaussianChange<N> {
     std::array::from_fn(|k| of[k.saturating_sub(2)])
 }
 
-/// The change with which the squared errors of pictures, and the ridge, are least: the solution by conjugate gradients, with a
-/// diagonal preconditioner. `errors` are the products of the adjoint with the errors of pictures. In each step `progress` is
-/// told of drawing all views.
+/// Returns the changes that minimise the squared errors of pictures plus the ridge. `errors` are the products of the
+/// adjoint with the errors of pictures. The method is that of conjugate gradients with the diagonal preconditioner
+/// `diagonal`, in `steps` steps. Each step reports the drawing of all views to `progress`.
 pub(crate) fn solve<const N: usize>(
     adjoint: &mut PictureAdjoint<'_>,
     mut errors: Vec<GaussianChange<N>>,

@@ -11,74 +11,78 @@ use crate::judge::{Judge, Score};
 use crate::refit::{Refitted, Refitting};
 use crate::report::reached;
 
-/// A quality may exceed the target by this much, in dB.
+/// Largest amount by which a quality may exceed the target, in dB.
 const CLOSE_DB: f64 = 0.1;
-/// A size may fall short of the target by this share.
+/// Largest share by which a size may fall short of the target.
 const CLOSE_SIZE: f64 = 0.01;
-/// Largest miss of a preset's first file, in dB, after which the step is taken from that file without another trial.
+/// Largest expected miss of a preset's first file, in dB, for which the file is refitted at its own step. After a larger
+/// miss another step is used first.
 const CLOSE_FIRST: f64 = 0.5;
-/// A preset may miss its aim by this much, in dB.
+/// Largest miss of a preset's aim, in dB, after which no further step is tried.
 const CLOSE_PRESET: f64 = 0.5;
-/// Steps in an octave that presets take. A scene in other units has scores that differ in the last digits, and takes the same
-/// step. At another step errors fall differently, which changes what few Gaussians show by half a decibel.
+/// Number of steps in an octave for presets. The scores of a scene in other units differ in the last digits, and the coarse
+/// grid gives the same step. At another step errors fall differently, which changes the pictures of few Gaussians by half a
+/// decibel.
 const STEPS_PER_OCTAVE: f64 = 16.0;
-/// The first file that is refitted may be expected to miss the target by this much, in dB or in the binary logarithm of bytes.
+/// Largest expected miss of the target at which a file is refitted for the first time, in dB and in the binary logarithm of
+/// bytes.
 const NEAR_DB: f64 = 0.7;
 const NEAR_LOG_BYTES: f64 = 0.1;
-/// Share of that once it is known what refitting gains.
+/// Factor on the largest expected miss once the gain of refitting has been measured.
 const NEAR_AGAIN: f64 = 0.2;
-/// Share of what a target may be exceeded by that is aimed for, at most.
+/// Largest margin of the search, as a share of the amount by which a target may be exceeded.
 const MOST_MARGIN: f64 = 0.75;
-/// Number of packings tried at most.
+/// Largest number of packings tried.
 const MAX_TRIES: usize = 14;
-/// The same if the least PSNR of a view is the target. One Gaussian changes it by up to 1.5 dB from one step to the next, so that more
-/// steps must be tried.
+/// Largest number of packings tried if the target is the least PSNR of a view. One Gaussian changes this PSNR by up to 1.5
+/// dB from one step to the next, so more steps must be tried.
 const MAX_TRIES_FOR_LEAST: usize = 20;
-/// First estimate of the decibels that pictures gain when the step is halved.
+/// First estimate of the gain when the step is halved, in dB.
 pub(crate) const DB_PER_HALVING: f64 = 4.5;
-/// Quality that [`FIRST_BYTES`] is for, in dB.
+/// Quality at which [`FIRST_BYTES`] is estimated, in dB.
 const FIRST_DB: f64 = 40.0;
-/// First estimate of the bytes of a Gaussian at [`FIRST_DB`].
+/// First estimate of the bytes for each Gaussian at [`FIRST_DB`].
 const FIRST_BYTES: f64 = 8.0;
 /// First estimate of the factor by which the file grows when the step is halved.
 const BYTES_PER_HALVING: f64 = 1.4;
-/// Quality above which 8-bit pictures are the same, in dB: their rounding alone has 59 dB. Such targets need not be met
-/// as closely, for each try at so small a step takes up to ten times as long as others.
+/// Quality above which 8-bit pictures are the same, in dB: their rounding alone has 59 dB. Higher targets need not be met
+/// as closely, because each try at so small a step takes up to ten times as long as others.
 const FINE_DB: f64 = 60.0;
-/// The same for sizes: bytes of a Gaussian, about those at [`FINE_DB`].
+/// Size above which a target need not be met as closely, in bytes for each Gaussian. It is about the size at [`FINE_DB`].
 const FINE_BYTES: f64 = 30.0;
-/// [`CLOSE_DB`] above [`FINE_DB`].
+/// Value of [`CLOSE_DB`] for targets above [`FINE_DB`].
 const CLOSE_FINE_DB: f64 = 1.0;
-/// [`CLOSE_SIZE`] above [`FINE_BYTES`].
+/// Value of [`CLOSE_SIZE`] for targets above [`FINE_BYTES`].
 const CLOSE_FINE_SIZE: f64 = 0.06;
-/// From this many bytes of a Gaussian on, the smallest step is tried first. It gave 126 bytes on fruit-drops and 142 on
-/// train-first1000.
+/// Size above which the smallest step is tried first, in bytes for each Gaussian. The smallest step gave 126 bytes on
+/// fruit-drops and 142 on train-first1000.
 const MOST_BYTES: f64 = 150.0;
-/// From this quality on the smallest step is tried first, in dB. It reached 80 dB on fruit-drops.
+/// Quality above which the smallest step is tried first, in dB. The smallest step reached 80 dB on fruit-drops.
 const MOST_DB: f64 = 80.0;
-/// Largest change of the step's binary logarithm from one try to the next.
+/// Largest change of the binary logarithm of the step from one try to the next.
 const MAX_MOVE: f64 = 3.0;
-/// Smallest and largest step tried. Others give no useful file.
+/// Smallest and largest step tried. Other steps give no useful file.
 const STEPS: [f64; 2] = [1e-9, 1e-2];
-/// Bytes reserved for the records of what was asked and reached, in the header of a file whose size is the target.
+/// Bytes reserved in the header for the records of the target and of the values reached, if the target is a size.
 const RECORD_BYTES: u64 = 448;
-/// A try between two others keeps this share of their distance from each, so that the interval shrinks.
+/// Least distance of a try from the two tries around it, as a share of their distance. The interval therefore shrinks.
 const LEAST_SHARE: f64 = 0.05;
-/// Binary logarithms of steps closer than this count as equal.
+/// Difference below which two binary logarithms of steps are the same.
 const SAME_STEP: f64 = 1e-4;
-/// Two tries must differ by more than this in the step's binary logarithm to give a slope.
+/// Least difference of the binary logarithms of two steps that give a slope.
 const SLOPE_STEP: f64 = 1e-3;
-/// A measured slope may differ from the last one by this factor at most.
+/// Largest factor between a measured slope and the slope before it.
 const SLOPE_FACTOR: f64 = 3.0;
 
 /// Name of [`Target::MinPsnr`].
 pub(crate) const MIN_PSNR: &str = "min-psnr";
 
-/// What a packed file shall reach.
+/// The target of a packed file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Target {
-    /// The smallest file whose mean PSNR over the judging views is at least this, in dB.
+    /// The smallest file whose mean PSNR over the judging views is at least this, in dB. For generated views the mean is
+    /// [`Score::judged`], over the quarter of them with the lowest PSNR.
     MeanPsnr(f64),
     /// The smallest file whose PSNR in every judging view is at least this, in dB.
     MinPsnr(f64),
@@ -89,7 +93,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// The target of the choices that programs give by name, of which a user makes at most one.
+    /// Returns the target of the choices that programs have by name. At most one of them should be given; the first one
+    /// counts.
     #[must_use]
     pub fn chosen(
         psnr: Option<f64>,
@@ -101,7 +106,7 @@ impl Target {
         psnr.or(size.map(Self::Size)).or(ratio.map(Self::Ratio))
     }
 
-    /// Name of the target in errors and, but for a ratio, in the file's record.
+    /// Returns the name of the target in errors and in the file's record. A ratio is recorded as `size`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -130,7 +135,7 @@ impl Target {
         Err(Error::parameter(self.name(), self.asked(), expected))
     }
 
-    /// The target that the file records: a ratio is recorded as the size it means.
+    /// Returns the target that the file records. A ratio becomes the size that it means.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the source's size")]
     fn recorded(self, source_bytes: u64) -> Self {
         match self {
@@ -139,7 +144,7 @@ impl Target {
         }
     }
 
-    /// The error of a target that is out of reach. `best` is the value nearest to it that was found.
+    /// Returns the error of a target that is out of reach. `best` is the value that came nearest to it.
     fn unreachable(self, best: f64, source_bytes: u64) -> Error {
         let nothing_smaller = "nothing smaller can be made of this scene";
         let smallest = libm::exp2(-best);
@@ -154,17 +159,18 @@ impl Target {
     }
 }
 
-/// One packing tried.
+/// A packing that was tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Try {
     log_step: f64,
-    /// For a quality decibels, which fall as the step grows. For a size minus the binary logarithm of the
-    /// bytes, which rises as the step grows.
+    /// For a quality: decibels, which fall as the step grows. For a size: minus the binary logarithm of the bytes, which
+    /// rises as the step grows.
     value: f64,
 }
 
-/// Packs to the aim of `preset`. A first file, not refitted, says what step that takes. If the next misses the aim by more
-/// than [`CLOSE_PRESET`], it is packed once more. Returns the closest.
+/// Packs to the aim of `preset`. The score of a first file, which is not refitted, gives the step. If the refitted file
+/// misses the aim by more than [`CLOSE_PRESET`], the scene is packed once more at another step. Returns the file that is
+/// nearest to the aim.
 ///
 /// # Errors
 /// Errors of packing and drawing.
@@ -176,7 +182,8 @@ pub(crate) fn pack_to_preset(
 ) -> Result<(Packed, CompressReport, Score)> {
     let aim = preset.decibels();
     let mut log_step = on_grid(libm::log2(packer.step_for(aim)), STEPS_PER_OCTAVE);
-    // Files before and after refitting are not on one line, so each step is found from the one before and the usual slope.
+    // Files before and after refitting are not on one line. Each step therefore follows from the last file and the usual
+    // slope.
     let after = |log_step: f64, value: f64| next_step(&[Try { log_step, value }], aim, &mut -DB_PER_HALVING);
     let (mut quantised, mut file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     let first = judge.score(&file.0.unpack()?, progress)?;
@@ -208,12 +215,12 @@ pub(crate) fn pack_to_preset(
     Ok((packed, report, score))
 }
 
-/// The nearest binary logarithm of a step, of so many in an octave.
+/// Returns the binary logarithm of the nearest step on a grid of `per_octave` steps in an octave.
 pub(crate) fn on_grid(log_step: f64, per_octave: f64) -> f64 {
     (log_step * per_octave).round() / per_octave
 }
 
-/// A file that meets a target.
+/// A file that meets the target.
 struct Found {
     log_step: f64,
     file_bytes: u64,
@@ -221,19 +228,19 @@ struct Found {
     report: CompressReport,
     /// `None` if the target is a size.
     reached: Option<Score>,
-    /// Whether it is complete ([`Refitting::complete`]).
+    /// Whether the first layer alone is fitted ([`Refitting::complete`]).
     complete: bool,
 }
 
-/// What is searched for, and where the search begins.
+/// The target of a search, and where the search begins.
 struct Search {
     target: Target,
     is_size: bool,
-    /// In the units of [`Try::value`].
+    /// The target, in the units of [`Try::value`].
     wanted: f64,
-    /// By how much `wanted` may be exceeded.
+    /// Largest amount by which `wanted` may be exceeded.
     close: f64,
-    /// How far a file that is not refitted may be from where it is expected to be, for the first one that is.
+    /// Largest difference of `wanted` and the expected value of a file that is refitted for the first time.
     near: f64,
     most_tries: usize,
     log_step: f64,
@@ -269,11 +276,11 @@ impl Search {
         Self { target, is_size, wanted, close, near, most_tries, log_step, slope }
     }
 
-    /// Packs until the target is met closely, with or without a `floor` under what is visible. Returns the value
-    /// nearest to the target if none meets it.
+    /// Packs until a file meets the target closely. `floor` tells whether visible Gaussians keep a least precision. Returns
+    /// the value nearest to the target as the inner error if no file meets the target.
     ///
-    /// Refitting takes longer than the rest, and gains about as much at one step as at the next. So files that are not refitted
-    /// say where to refit one, and its gain says where the next must be.
+    /// Refitting takes longer than the rest, and gains about as much at one step as at the next. Files that are not
+    /// refitted therefore tell at which step to refit one. The gain of that file tells the next step.
     fn run(
         &self,
         packer: &Refitting<impl Borrow<Splats>>,
@@ -286,7 +293,8 @@ impl Search {
         let mut is_measured = !packer.refits();
         let mut tries: Vec<Try> = Vec::new();
         let mut best: Option<Found> = None;
-        // Files in a row that were too far from the target to refit them. Values jump, so that no step may be near enough.
+        // Number of files in a row that were too far from the target to be refitted. Values jump, so there may be no step
+        // that is near enough.
         let mut passed = 0;
         let (mut nearest, mut margin) = (f64::NEG_INFINITY, 0.5 * self.close);
         for _ in 0..self.most_tries {
@@ -307,7 +315,8 @@ impl Search {
             passed = 0;
             let mut refitted = packer.refit(&quantised, file, progress)?;
             if self.is_size {
-                // The bytes of a first layer's changes count, and its pictures do not.
+                // The bytes of the first layer's changes count towards the size; the pictures of the first layer do not
+                // count.
                 refitted = Refitted::complete(packer.complete(&quantised, refitted, progress)?);
             }
             let packed = &refitted.file.0;
@@ -315,13 +324,13 @@ impl Search {
                 if packer.refits() { self.value(packed, judge, progress)? } else { (plain, score) };
             (gain, is_measured) = (value - plain, true);
             nearest = nearest.max(value);
-            // Values do not change evenly with the step: one that misses by a hair may do so again.
+            // Values do not change evenly with the step: after a narrow miss the next step may miss narrowly too.
             margin = (margin + (self.wanted - value).max(0.0)).min(MOST_MARGIN * self.close);
             let met = value >= self.wanted;
             let is_close = met && value - self.wanted <= self.close;
             let file_bytes = LexiWriter::packed(packed).file_bytes();
-            // Of those that reach a quality the smallest file is the best, and of those that reach a size the one of
-            // the smallest step.
+            // Of the files that reach a quality the smallest is the best. Of the files that reach a size the file of the
+            // smallest step is the best.
             let is_better = |best: &Found| {
                 if self.is_size { log_step < best.log_step } else { file_bytes < best.file_bytes }
             };
@@ -350,7 +359,7 @@ impl Search {
         Ok(Ok(Found { packed, report, ..best }))
     }
 
-    /// The value of a file, and its score if the target is a quality.
+    /// Returns the value of a file, and its score if the target is a quality.
     fn value(
         &self,
         packed: &Packed,
@@ -367,8 +376,8 @@ impl Search {
     }
 }
 
-/// Packs until `target` is met as closely as possible. The file records what was asked and reached. A ratio
-/// is one of `source_bytes`.
+/// Packs until a file meets `target` as closely as possible. The file records the target and the values reached. A ratio is
+/// relative to `source_bytes`.
 ///
 /// # Errors
 /// [`Error::Parameter`] if the target is out of range or cannot be met. Errors of packing and drawing.
@@ -383,7 +392,7 @@ pub(crate) fn pack_to_target(
     let recorded = target.recorded(source_bytes);
     let search = Search::new(packer, recorded);
     let found = match search.run(packer, judge, true, progress)? {
-        // A size is asked for however bad the file is.
+        // A size must be reached, however bad the file is. The search is repeated without the floor.
         Err(_) if search.is_size => search.run(packer, judge, false, progress)?,
         found => found,
     };
@@ -398,20 +407,21 @@ pub(crate) fn pack_to_target(
     Ok((packed.with_target(record), report, score))
 }
 
-/// Returns the binary logarithm of the next step to try: on the line through the two tries around the wanted
-/// value, or beyond the last try, within [`STEPS`]. `None` if that step was tried.
+/// Returns the binary logarithm of the next step to try, within [`STEPS`]. It lies on the line through the two tries around
+/// the wanted value, or else beyond the last try. Returns `None` if that step was tried before.
 fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
-    // Values need not change evenly with the step: a view may lose or gain decibels by a hair. So of the tries that meet
-    // what is wanted the one nearest to those that do not counts, and of those the next one.
+    // Values need not change evenly with the step: one step may change a view by decibels. Of the tries that meet the
+    // wanted value, the one nearest to those that miss it counts. Of the tries that miss it, the next one counts.
     let towards_below = -slope.signum();
     let above = tries
         .iter()
         .filter(|t| t.value >= wanted)
         .max_by(|a, b| (towards_below * a.log_step).total_cmp(&(towards_below * b.log_step)));
     let is_beyond = |t: &&Try| above.is_none_or(|a| towards_below * (t.log_step - a.log_step) > 0.0);
-    // If none meets it, the search goes on beyond the last step, though one before it may have come nearer.
+    // If no try meets the wanted value, the search goes on beyond the last step, though an earlier step may have come
+    // nearer.
     let distance = |t: &Try| above.map_or(towards_below * t.log_step, |a| (t.log_step - a.log_step).abs());
-    // If all that miss are on the wrong side, the search goes on beyond the one that meets.
+    // If all tries that miss the wanted value are on the wrong side, the search goes on beyond the try that meets it.
     let below = tries
         .iter()
         .filter(|t| t.value < wanted)
@@ -436,7 +446,7 @@ fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
             let wanted_move = (wanted - from.value) / *slope;
             let moved = from.log_step + wanted_move.clamp(-MAX_MOVE, MAX_MOVE);
             match tries.len() {
-                // Small steps take long, and those on the way to the smallest would not be the last.
+                // Small steps take long, and steps on the way to the smallest would not be the last.
                 2.. if from.log_step + wanted_move <= limits[0] => limits[0],
                 _ => moved.clamp(limits[0], limits[1]),
             }

@@ -11,10 +11,12 @@ use crate::parts;
 pub use crate::parts::in_parts;
 use crate::report::{CompressionReport, SensitivitySource};
 
-/// Looks at a bucket with `renderer`, for the quality that `preset` aims at, or guesses what shows from each Gaussian alone.
+/// Measures the sensitivity of a bucket with `renderer`, for the quality that `preset` aims at. Without a renderer the
+/// sensitivity is guessed from each Gaussian alone.
 ///
 /// # Errors
-/// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the bucket does not fit.
+/// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the bucket does not
+/// fit.
 pub fn look(
     plan: &Plan,
     bucket: &Bucket,
@@ -28,7 +30,7 @@ pub fn look(
     Ok(bucket.look(plan, observed)?)
 }
 
-/// Codes a bucket. What it shows is fitted to pictures if it was looked at and not `guessed`.
+/// Codes a bucket. If its sensitivity was not `guessed`, base colours and opacities are fitted to pictures.
 ///
 /// # Errors
 /// As [`Coding::code`], and errors of drawing.
@@ -46,7 +48,7 @@ pub fn code(
     coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut refit) }, progress)
 }
 
-/// The report of a file that was assembled of buckets, which were looked at or `guessed`.
+/// Returns the report of a file that was assembled from buckets. `guessed` tells whether their sensitivity was guessed.
 #[must_use]
 pub fn report(done: &PackedFile, guessed: bool) -> CompressionReport {
     let origin = if guessed { SensitivitySource::Guess } else { SensitivitySource::Views };

@@ -1,6 +1,6 @@
-//! How fast a scene is drawn for each way to hold it, and how fast it could be.
+//! Measures how fast a scene is drawn with each way of holding SH, and how fast it could be.
 //!
-//! Every view is drawn repeatedly after a warm-up, and only drawing is timed, as the field does (INRIA
+//! Every view is drawn repeatedly after a warm-up. Only drawing is timed, as is usual in the field (INRIA
 //! `gaussian-splatting` issues 349 and 351). A GPU is timed by its own time stamps.
 
 use std::collections::BTreeMap;
@@ -13,20 +13,20 @@ use serde::Serialize;
 
 use lexisplat_compress::{Error, Result};
 
-/// How to measure.
+/// Options of a benchmark.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct BenchOptions {
-    /// Frames drawn from each view before any is timed.
+    /// Number of frames drawn from each view before the timed frames.
     pub warmup: u32,
-    /// Frames timed from each view, at least 1.
+    /// Number of timed frames of each view, at least 1.
     pub repeat: u32,
     /// Colour behind the scene.
     pub background: [f32; 3],
 }
 
 impl BenchOptions {
-    /// Options with the given numbers of frames, over black.
+    /// Returns options with these numbers of frames, over black.
     #[must_use]
     pub fn new(warmup: u32, repeat: u32) -> Self {
         Self { warmup, repeat: repeat.max(1), background: [0.0; 3] }
@@ -58,44 +58,44 @@ impl Spread {
     }
 }
 
-/// Times and bytes of one way to hold the scene.
+/// Durations and numbers of bytes of one way of holding the scene.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[non_exhaustive]
 pub struct PathTimes {
-    /// `dense-f32`, `sparse` and so on; on the processor `cpu-dense` or `cpu-sparse`.
+    /// Name of the path: `dense-f32`, `sparse` and so on; on the processor `cpu-dense` or `cpu-sparse`.
     pub path: String,
-    /// Milliseconds of a frame, over all frames of all views.
+    /// Duration of a frame, in milliseconds, over all frames of all views.
     pub frame: Spread,
-    /// Frames in a second: views over the sum of their mean times.
+    /// Frames per second: the number of views over the sum of their mean durations.
     pub fps: f64,
-    /// Milliseconds of each stage, by name.
+    /// Duration of each stage, in milliseconds, by name.
     pub stages: BTreeMap<String, Spread>,
-    /// Milliseconds of each view, by name.
+    /// Duration of a frame of each view, in milliseconds, by name.
     pub views: BTreeMap<String, Spread>,
-    /// Gaussians shaded, on average over views.
+    /// Number of shaded Gaussians, on average over views.
     pub visible: f64,
-    /// Pairs of a Gaussian and a tile, on average over views; 0 on the processor.
+    /// Number of pairs of a Gaussian and a tile, on average over views; 0 on the processor.
     pub entries: f64,
-    /// Bytes on the GPU, or in memory, for geometry.
+    /// Bytes of geometry on the GPU, or in memory.
     pub geometry_bytes: u64,
-    /// Bytes on the GPU, or in memory, for everything that colour needs.
+    /// Bytes of everything that colours need, on the GPU or in memory.
     pub sh_bytes: u64,
-    /// Bytes that shading one visible Gaussian moves: its slot, position, SH and colour.
+    /// Number of bytes that are moved to shade one visible Gaussian: its slot, position, SH and colour.
     pub shading_bytes: f64,
-    /// Bytes that shading all visible Gaussians of a frame moves.
+    /// Number of bytes that are moved to shade all visible Gaussians of a frame.
     pub shading_bytes_per_frame: f64,
-    /// Bytes of geometry that a frame reads to find and project visible Gaussians. 0 on the processor.
+    /// Number of bytes of geometry that a frame reads to find and project visible Gaussians; 0 on the processor.
     pub geometry_bytes_per_frame: f64,
 }
 
 impl PathTimes {
-    /// Returns the median milliseconds of the stage `name`, or 0 if there is none.
+    /// Returns the median duration of the stage `name`, in milliseconds; 0 if there is no such stage.
     #[must_use]
     pub fn stage(&self, name: &str) -> f64 {
         self.stages.get(name).map_or(0.0, |spread| spread.median)
     }
 
-    /// Returns the bytes in a second that the radiance stage moved.
+    /// Returns the bytes per second that the radiance stage moved; `None` if its duration is 0.
     #[must_use]
     pub fn radiance_bandwidth(&self) -> Option<f64> {
         let seconds = self.stage("radiance") / 1e3;
@@ -103,7 +103,7 @@ impl PathTimes {
     }
 }
 
-/// One frame's times.
+/// The durations of one frame.
 struct Sample {
     total: f64,
     stages: Vec<(String, f64)>,
@@ -111,7 +111,7 @@ struct Sample {
     entries: f64,
 }
 
-/// Draws from every camera. `frame` draws once.
+/// Draws from every camera. `frame` draws one frame.
 fn run(
     path: &str,
     cameras: &[Camera],
@@ -160,7 +160,7 @@ fn run(
     })
 }
 
-/// Times drawing on `gpu` with the scene held as `path` says. Reports [`Stage::Draw`] to `progress`, in views.
+/// Times drawing on `gpu` with the scene held by `path`. Reports [`Stage::Draw`] to `progress`, in views.
 ///
 /// # Errors
 /// [`Error::Parameter`] without cameras. [`Error::Render`] if the scene or a view does not fit on the GPU.
@@ -201,7 +201,7 @@ pub fn bench_gpu(
 /// Times drawing on the processor. Reports [`Stage::Draw`] to `progress`, in views.
 ///
 /// # Errors
-/// [`Error::Parameter`] without cameras, or if one cannot be drawn with. [`Error::Codec`] if `progress` cancels.
+/// [`Error::Parameter`] without cameras, or if a camera is not valid. [`Error::Codec`] if `progress` cancels.
 pub fn bench_cpu(
     scene: &Scene<'_>,
     cameras: &[Camera],
@@ -231,30 +231,30 @@ pub fn bench_cpu(
     Ok(PathTimes { geometry_bytes: (scene.len() * each) as u64, sh_bytes: sh_bytes as u64, ..times })
 }
 
-/// The paper's model of shading a Gaussian, with the measured rates of a GPU.
+/// The paper's model of the time to shade Gaussians, with the measured rates of a GPU.
 ///
-/// The paper (section 5, rendering) counts 96 operations and 192 bytes for dense SH. For codes it adds 90
-/// operations for each nonzero. A stage takes as long as the slower of moving and computing.
+/// The paper (section 5, rendering) counts 96 operations and 192 bytes for dense SH. For codes it adds 90 operations for
+/// each nonzero. The time of a stage is the larger of the times of moving and of computing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RadianceModel {
-    /// Bytes moved for a Gaussian.
+    /// Number of bytes moved for a Gaussian.
     pub bytes: f64,
-    /// Operations for a Gaussian.
+    /// Number of operations for a Gaussian.
     pub operations: f64,
-    /// Milliseconds that all visible Gaussians should take.
+    /// Predicted duration for all visible Gaussians, in milliseconds.
     pub predicted: f64,
-    /// Milliseconds that all visible Gaussians took.
+    /// Measured duration for all visible Gaussians, in milliseconds.
     pub measured: f64,
 }
 
-/// Operations of dense SH of degree 3 for one Gaussian, as the paper counts them.
+/// Number of operations of dense SH of degree 3 for one Gaussian, as counted by the paper.
 const DENSE_OPERATIONS: f64 = 96.0;
-/// Operations of one nonzero: a multiplication and an addition for each of 45 coefficients.
+/// Number of operations of one nonzero: a multiplication and an addition for each of 45 coefficients.
 const NONZERO_OPERATIONS: f64 = 90.0;
 
 impl RadianceModel {
-    /// Returns the model of one path on a GPU of `speed`. `nonzeros` is the mean number of a Gaussian, if the path
-    /// is sparse.
+    /// Returns the model of one path on a GPU of `speed`. `nonzeros` is the mean number of nonzeros of a Gaussian, if the
+    /// path is sparse.
     #[must_use]
     pub fn new(times: &PathTimes, nonzeros: Option<f64>, speed: &Speed) -> Self {
         let operations = DENSE_OPERATIONS + nonzeros.unwrap_or(0.0) * NONZERO_OPERATIONS;
@@ -268,9 +268,9 @@ impl RadianceModel {
     }
 }
 
-/// Returns the share of lanes that work while a group of `lanes` lanes sums codes. The group takes as long as its
-/// longest code. The first value is for Gaussians in their order, the second for Gaussians ordered by nonzeros
-/// within blocks of `block`.
+/// Returns the share of lanes that work while a group of `lanes` lanes sums codes. The group takes as long as its longest
+/// code. The first value is for Gaussians in their own order, the second for Gaussians ordered by nonzeros within blocks
+/// of `block`.
 #[must_use]
 pub fn busy_lanes(model: &Model, lanes: usize, block: usize) -> [f64; 2] {
     let counts = model.codes().counts();

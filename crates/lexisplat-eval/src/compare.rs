@@ -1,4 +1,4 @@
-//! Two scenes drawn from the same cameras, scored view by view. No photos are needed.
+//! Draws two scenes from the same cameras and scores them view by view. No photos are needed.
 
 use lexisplat::{Progress, Stage};
 use lexisplat_render::{Camera, Image, Renderer, Scene};
@@ -9,12 +9,12 @@ use lexisplat_compress::{DrawOptions, Error, Result};
 
 /// Draws `a` and `b` with `renderer` from every camera and scores `b` against `a` by PSNR and SSIM.
 ///
-/// Reports [`Stage::Draw`] to `progress`, in views. `on_view` is given each score with the pictures of `a` and
-/// of `b` that were scored, and ends the comparison by an error.
+/// Reports [`Stage::Draw`] to `progress`, in views. `on_view` receives each score and the two scored pictures, those of
+/// `a` and of `b`. An error of `on_view` ends the comparison.
 ///
 /// # Errors
-/// [`Error::Parameter`] if there are no cameras, or one cannot be drawn with. On a GPU [`Error::Render`] if a
-/// scene or a view does not fit. [`Error::Codec`] if `progress` cancels. Errors of `on_view`.
+/// [`Error::Parameter`] if there are no cameras, or a camera is not valid. On a GPU [`Error::Render`] if a scene or a
+/// view does not fit. [`Error::Codec`] if `progress` cancels. Errors of `on_view`.
 pub fn compare<E: From<Error>>(
     renderer: &mut Renderer,
     a: &Scene<'_>,
@@ -44,8 +44,8 @@ pub fn compare<E: From<Error>>(
     Ok(Comparison::of(views))
 }
 
-/// Scores each of `pictures` against its reference. All three lists are in the same order. Reports [`Stage::Score`] to
-/// `progress`, in views.
+/// Scores each of `pictures` against its reference. `cameras`, `references` and `pictures` are in the same order. Reports
+/// [`Stage::Score`] to `progress`, in views.
 ///
 /// # Errors
 /// [`Error::Parameter`] if the lists differ in length, or two pictures in size. [`Error::Codec`] if `progress` cancels.

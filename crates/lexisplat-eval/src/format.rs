@@ -2,20 +2,20 @@
 
 use std::borrow::Cow;
 
-/// Most bytes of a file name: file systems take 255, and a number and an extension may follow.
+/// Largest number of bytes of a file name. File systems allow 255, and a number and an extension may follow.
 const LONGEST_NAME: usize = 180;
 
-/// Returns `text` with every character that a terminal obeys instead of showing written as JSON writes it, such
-/// as `\u001b`.
+/// Returns `text` with certain characters escaped as in JSON, such as `\u001b`: those that a terminal obeys instead of
+/// showing.
 ///
-/// These are the control characters, the line separators and the marks that change the direction of text. Text
-/// from files may hold any of them.
+/// These are the control characters, the line separators and the marks that change the direction of text. Text from files
+/// may hold any of them.
 #[must_use]
 pub fn escape(text: &str) -> Cow<'_, str> {
     escape_all(text, is_obeyed)
 }
 
-/// [`escape`] for text of several lines: line feeds stay.
+/// Escapes text of several lines like [`escape`]. Line feeds stay.
 #[must_use]
 pub fn escape_lines(text: &str) -> Cow<'_, str> {
     escape_all(text, |c| c != '\n' && is_obeyed(c))
@@ -28,7 +28,7 @@ fn escape_all(text: &str, is_escaped: impl Fn(char) -> bool) -> Cow<'_, str> {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         if is_escaped(c) {
-            // All of them are in the basic plane, so that four digits are enough, as JSON requires.
+            // All these characters are in the basic plane, so four digits are enough, as JSON requires.
             out += &format!("\\u{:04x}", u32::from(c));
         } else {
             out.push(c);
@@ -43,8 +43,8 @@ fn is_obeyed(c: char) -> bool {
     c.is_control() || is_direction || matches!(c, '\u{2028}' | '\u{2029}')
 }
 
-/// Returns `text` as a cell of CSV that no spreadsheet takes for a formula: what would begin one begins with `'` instead. Names
-/// come from files. Numbers stay as they are.
+/// Returns `text` as a cell of CSV that no spreadsheet takes for a formula: text that would begin a formula gets a `'`
+/// before it. Texts such as names come from files. Numbers stay as they are.
 #[must_use]
 pub fn csv_cell(text: &str) -> Cow<'_, str> {
     let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
@@ -54,7 +54,7 @@ pub fn csv_cell(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// Returns `count` bytes in the largest unit that keeps a digit before the point (powers of 1000).
+/// Returns a number of bytes as text, in the largest unit that keeps a digit before the point (powers of 1000).
 #[must_use]
 pub fn bytes(count: u64) -> String {
     let units = ["kB", "MB", "GB", "TB"];
@@ -90,14 +90,14 @@ pub fn decibels(psnr: Option<f64>) -> String {
     psnr.map_or_else(|| "identical".to_owned(), |value| format!("{value:.2} dB"))
 }
 
-/// Returns how many times smaller `part` is than `whole`, such as `2.50x`, or a dash if `part` is 0.
+/// Returns the ratio of `whole` to `part`, such as `2.50x`, or a dash if `part` is 0.
 #[must_use]
 pub fn ratio(whole: u64, part: u64) -> String {
     if part == 0 { "-".to_owned() } else { format!("{:.2}x", whole as f64 / part as f64) }
 }
 
-/// `name` as one part of a path that is safe on every system: letters, digits and `-_.` stay, other characters become
-/// `_`. The result is not empty, not `.` or `..`, and at most 180 bytes long. Two names may give the same result.
+/// Returns `name` as one part of a path that is safe on every system. Letters, digits and `-_.` stay; other characters
+/// become `_`. The result is not empty, not `.` or `..`, and at most 180 bytes long. Two names may give the same result.
 #[must_use]
 pub fn file_name(name: &str) -> String {
     let mut out = name.trim().replace(|c: char| !c.is_alphanumeric() && !"-_.".contains(c), "_");

@@ -1,5 +1,5 @@
-//! How fast several scenes are drawn, measured in turn: a frame of the first, one of the second, and so on. So whatever
-//! else slows the machine slows all of them, and the rounds show how much the same drawing varies.
+//! Measures how fast several scenes are drawn in turn: a frame of the first scene, a frame of the second, and so on.
+//! Other load on the machine therefore slows all scenes alike, and the rounds show how much the same drawing varies.
 
 use std::time::Instant;
 
@@ -11,19 +11,19 @@ use serde::{Deserialize, Serialize};
 use crate::bench::BenchOptions;
 use lexisplat_compress::{Error, Result};
 
-/// Frames a second of one scene. A round draws every view once.
+/// Frames per second of one scene. A round draws every view once.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FrameRate {
-    /// Frames of all rounds over their time.
+    /// Number of frames of all rounds over their duration.
     pub mean: f64,
-    /// The slowest round.
+    /// Frames per second of the slowest round.
     pub least: f64,
-    /// The fastest round.
+    /// Frames per second of the fastest round.
     pub most: f64,
 }
 
 impl FrameRate {
-    /// The rate of `views` frames a round, of rounds that took these milliseconds.
+    /// Returns the rate of rounds of `views` frames. `rounds` has the durations of the rounds, in milliseconds.
     fn of(views: usize, rounds: &[f64]) -> Self {
         let rate = |milliseconds: f64| 1e3 * views as f64 / milliseconds.max(f64::MIN_POSITIVE);
         let pick = |by: fn(f64, f64) -> f64| rounds.iter().copied().reduce(by).unwrap_or_default();
@@ -32,8 +32,8 @@ impl FrameRate {
     }
 }
 
-/// Draws `scenes` in turn in every view, and again in each further round. `frame` draws a scene from a camera and gives the
-/// milliseconds that it took.
+/// Draws `scenes` in turn in every view, and again in each further round. `frame` draws a scene from a camera and returns
+/// the duration in milliseconds.
 fn in_turn(
     scenes: usize,
     cameras: &[Camera],
@@ -67,7 +67,7 @@ fn in_turn(
 /// Times drawing `scenes` in turn on the processor. Reports [`Stage::Draw`] to `progress`, in views.
 ///
 /// # Errors
-/// [`Error::Parameter`] without cameras, or if one cannot be drawn with. [`Error::Codec`] if `progress` cancels.
+/// [`Error::Parameter`] without cameras, or if a camera is not valid. [`Error::Codec`] if `progress` cancels.
 pub fn bench_cpu_in_turn(
     scenes: &[Scene<'_>],
     cameras: &[Camera],
@@ -84,7 +84,7 @@ pub fn bench_cpu_in_turn(
     })
 }
 
-/// Times drawing `scenes` in turn on `gpu`, by its own time stamps where it has them. Reports [`Stage::Draw`] to `progress`,
+/// Times drawing `scenes` in turn on `gpu`, by its own time stamps if it has them. Reports [`Stage::Draw`] to `progress`,
 /// in views.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
-//! Metrics and comparison of 3D Gaussian Splatting scenes, with photos or without, and frame rates.
+//! Metrics and comparison of 3D Gaussian Splatting scenes, with or without photos, and frame rates.
 //!
-//! Two scenes compared:
+//! An example that compares two scenes:
 //!
 //! ```
 //! use lexisplat::{CompressOptions, Silent, compress};
@@ -31,6 +31,9 @@
 //! assert!(comparison.psnr.min.is_none_or(|psnr| psnr > 30.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! Start with [`compare`]. A [`Scorer`] scores pairs of pictures, such as a drawn picture and a photo, by more metrics. [`metrics`]
+//! has the metrics themselves, [`bench_cpu`] and [`bench_gpu`] measure times, and [`SceneFile`] reads a scene of any format.
 
 mod bench;
 mod compare;

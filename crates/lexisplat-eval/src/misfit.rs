@@ -5,11 +5,11 @@ use lexisplat_render::Image;
 
 use crate::scores::Comparison;
 
-/// Largest mean PSNR against photos that warns, in dB. Published models reach 20 dB and more on their hardest
-/// scenes, and a plain grey picture 10 to 14 dB.
+/// Mean PSNR against photos below which there is a warning, in dB. Published models reach 20 dB and more on their hardest
+/// scenes. A plain grey picture reaches 10 to 14 dB.
 const MISFIT_DB: f64 = 15.0;
 
-/// Returns a warning for each sign that cameras do not belong to the scene `model`: most of its `pictures` show
+/// Returns a warning for each sign that cameras do not belong to the scene `model`: most of its `pictures` show almost
 /// nothing but `background`, or they are far from the photos.
 #[must_use]
 pub fn misfit(

@@ -4,14 +4,14 @@ use lexisplat_render::Image;
 
 use crate::metrics::clip;
 
-/// Factor that makes differences visible.
+/// Factor on differences, so that they are visible.
 pub const AMPLIFICATION: f32 = 10.0;
 /// Width of the gap between pictures, in pixels.
 const GAP: u32 = 4;
 /// Colour of the gap: a medium grey.
 const GAP_COLOUR: [u8; 3] = [128; 3];
 
-/// The absolute difference of two pictures of one size, times [`AMPLIFICATION`].
+/// Returns the absolute difference of two pictures of the same size, times [`AMPLIFICATION`].
 #[must_use]
 pub fn difference(a: &Image, b: &Image) -> Image {
     let pixels = a
@@ -23,7 +23,7 @@ pub fn difference(a: &Image, b: &Image) -> Image {
     Image { width: a.width, height: a.height, pixels }
 }
 
-/// `a`, `b` and their amplified difference side by side, in 8 bits: width, height, pixels row by row.
+/// Returns `a`, `b` and their amplified difference side by side, in 8 bits: width, height, and pixels row by row.
 #[must_use]
 pub fn montage(a: &Image, b: &Image) -> (u32, u32, Vec<[u8; 3]>) {
     let parts = [a.to_8bit(), b.to_8bit(), difference(a, b).to_8bit()];

@@ -4,10 +4,10 @@ use image::ImageEncoder;
 
 use lexisplat_compress::{Error, Result};
 
-/// An 8-bit RGB picture of `width * height` pixels as the bytes of a PNG file.
+/// Returns an 8-bit RGB picture of `width * height` pixels as the bytes of a PNG file.
 ///
 /// # Errors
-/// [`Error::Parameter`] if there are no pixels, or not `width * height`.
+/// [`Error::Parameter`] if there are no pixels, or their number is not `width * height`.
 pub fn png(width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<Vec<u8>> {
     let wrong = || Error::parameter("picture", pixels.len(), format!("{width} x {height} pixels"));
     if pixels.len() as u64 != u64::from(width) * u64::from(height) {

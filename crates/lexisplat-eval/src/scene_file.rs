@@ -1,4 +1,4 @@
-//! Scenes of any format from files, told apart by content.
+//! Scenes of any format from files. The format is recognised by content.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use lexisplat::{Error, FileKind, FormatError, Input, Model, Offset, Result, Sile
 use lexisplat_formats::{Kind, Opened, Siblings, scene_path};
 use lexisplat_render::Scene;
 
-/// A scene of another format than PLY and .lexi.
+/// A scene of another format than PLY or .lexi.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OtherRead {
     /// The format.
@@ -25,22 +25,22 @@ pub struct OtherRead {
 pub enum Loaded {
     /// A PLY.
     Ply(Box<PlyRead>),
-    /// A scene of another format with dense SH.
+    /// A scene with dense SH of another format.
     Other(Box<OtherRead>),
-    /// A .lexi, and before it was decoded if it is a packed one.
+    /// The decoded model of a .lexi, and for a packed .lexi also its packed form.
     Lexi(Box<Model>, Option<Box<Packed>>),
 }
 
-/// Where a scene is.
+/// The location of a scene: its offset, and the mean of its positions.
 #[derive(Debug, Clone, Copy)]
 pub struct Whereabouts {
     offset: Option<Offset>,
-    /// The mean of the positions, relative to the offset.
+    /// Mean of the positions, relative to the offset.
     middle: [f64; 3],
 }
 
 impl Whereabouts {
-    /// Where `scene` is.
+    /// Returns the location of `scene`.
     #[must_use]
     pub fn of(scene: &Scene<'_>) -> Self {
         let positions = &scene.geometry().positions;
@@ -52,14 +52,15 @@ impl Whereabouts {
         Self { offset: scene.meta().offset, middle: middle.map(|sum| sum / count) }
     }
 
-    /// Whether the scene, which has no offset, is nearer to the origin than to `offset`.
+    /// Returns whether the scene, which has no offset, is nearer to the origin than to `offset`.
     fn is_beside(&self, offset: Offset) -> bool {
         let far = |to: [f64; 3]| (0..3).map(|k| (self.middle[k] - to[k]).abs()).sum::<f64>();
         far([0.0; 3]) < far(offset.get())
     }
 }
 
-/// Moves the positions of `splats`, or only says that they are relative to `offset`.
+/// Changes the offset of `splats` to `offset`. If `moves` is set, the positions are changed so that the scene stays in
+/// place. Otherwise they are only marked as relative to `offset`.
 fn aligned(splats: &mut Splats, moves: bool, offset: Option<Offset>) {
     if moves {
         splats.rebase(offset);
@@ -77,30 +78,30 @@ impl Loaded {
     }
 }
 
-/// A scene, its name and its size.
+/// A scene with its name and size.
 #[derive(Debug)]
 pub struct SceneFile {
     /// The scene.
     pub loaded: Loaded,
-    /// The file's name as the user gave it, or what stands for it.
+    /// Name of the file as given by the user, or a name that stands for it.
     pub name: String,
     /// Size of the file in bytes.
     pub bytes: u64,
 }
 
 impl SceneFile {
-    /// Reads a scene of any format, which the bytes tell. Of the options only the limits concern a .lexi.
+    /// Reads a scene of any format, which is recognised by content. Of the options only the limits apply to a .lexi.
     ///
     /// # Errors
-    /// What [`Input::open_within`] and [`lexisplat_formats::open`] say.
+    /// As [`Input::open_within`] and [`lexisplat_formats::open`].
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
         let path = &*scene_path(path);
-        // Once, for a pipe gives its bytes once.
+        // The file is opened once, because a pipe gives its bytes only once.
         let bytes = Input::open_within(path, &options.limits)?;
         Self::read_files(&path.display().to_string(), &bytes, Siblings::of(path), options)
     }
 
-    /// [`Self::read`] of a file in memory, called `name` in errors.
+    /// Reads a file in memory like [`Self::read`]. Errors call it `name`.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -108,7 +109,8 @@ impl SceneFile {
         Self::read_files(name, bytes, Siblings::NONE, options)
     }
 
-    /// [`Self::read_bytes`] of a scene that may have several files; it takes the others from `siblings`.
+    /// Reads a file in memory like [`Self::read_bytes`]. The other files of a scene of several files come from
+    /// `siblings`.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -132,19 +134,19 @@ impl SceneFile {
         Ok(Self { loaded, name: name.to_owned(), bytes: file_bytes })
     }
 
-    /// The scene that is there of a .lexi file called `name`, of `bytes` bytes in all, with what `reader` was told to leave
-    /// out.
+    /// Returns the scene of an open .lexi file called `name`, whose whole size is `bytes` bytes. Parts that `reader` was
+    /// told to leave out are missing.
     ///
     /// # Errors
-    /// What [`LexiReader::model`] says.
+    /// As [`LexiReader::model`].
     pub fn of_lexi(reader: &LexiReader<'_>, name: &str, bytes: u64) -> Result<Self> {
         let loaded = Loaded::Lexi(Box::new(reader.model()?), None);
         Ok(Self { loaded, name: name.to_owned(), bytes })
     }
 
-    /// Makes positions relative to what those of another scene are relative to, so that both can be drawn from the same
-    /// cameras. Positions of a file that cannot keep an offset are taken as relative to that of the other scene, if the
-    /// Gaussians are nearer to the origin than to the offset.
+    /// Changes the offset of the scene to that of another scene, so that both can be drawn from the same cameras.
+    /// Positions of a file that cannot hold an offset are taken as relative to the offset of the other scene, if the
+    /// Gaussians are nearer to the origin than to this offset.
     pub fn align(&mut self, with: &Whereabouts) {
         let own = Whereabouts::of(&self.scene());
         let (moves, offset) = match (own.offset, with.offset) {
@@ -160,7 +162,7 @@ impl SceneFile {
         }
     }
 
-    /// The scene, to draw.
+    /// Returns the scene for drawing.
     #[must_use]
     pub fn scene(&self) -> Scene<'_> {
         match &self.loaded {
@@ -170,7 +172,7 @@ impl SceneFile {
         }
     }
 
-    /// The scene with dense SH, if the file is no .lexi.
+    /// Returns the scene with dense SH; `None` for a .lexi.
     #[must_use]
     pub fn splats(&self) -> Option<&Splats> {
         match &self.loaded {
@@ -180,7 +182,7 @@ impl SceneFile {
         }
     }
 
-    /// [`Self::splats`], taken out.
+    /// Returns the scene with dense SH, like [`Self::splats`], by value.
     ///
     /// # Errors
     /// [`lexisplat::Error::Format`] for a .lexi.
@@ -195,7 +197,7 @@ impl SceneFile {
         }
     }
 
-    /// The format.
+    /// Returns the format.
     #[must_use]
     pub fn kind(&self) -> Kind {
         match &self.loaded {
@@ -205,7 +207,7 @@ impl SceneFile {
         }
     }
 
-    /// What a packed file says of itself.
+    /// Returns the header of a packed file; `None` for other files.
     #[must_use]
     pub fn packed_head(&self) -> Option<&PackedHead> {
         match &self.loaded {
@@ -214,7 +216,7 @@ impl SceneFile {
         }
     }
 
-    /// What is odd about the file.
+    /// Returns the oddities of the file, one sentence each.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         match &self.loaded {

@@ -1,4 +1,4 @@
-//! The metrics that two pictures are scored by.
+//! Scores two pictures by several metrics.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::metrics::{Lpips, Metric, flip, psnr, ssim};
 use crate::scores::ViewScore;
 use lexisplat_compress::Result;
 
-/// Scores pictures by PSNR and SSIM, and by more if asked to. Clones share the weights of networks.
+/// Scores pictures by PSNR and SSIM, and by more metrics if they are added. Clones share the weights of networks.
 #[derive(Debug, Clone, Default)]
 pub struct Scorer {
     flip: bool,
@@ -31,7 +31,7 @@ impl Scorer {
         self
     }
 
-    /// Adds LPIPS by this network, with pictures in both ranges. It replaces one with the same network.
+    /// Adds LPIPS by this network, with pictures in both ranges. A network of the same kind is replaced.
     #[must_use]
     pub fn with_lpips(mut self, lpips: Lpips) -> Self {
         self.lpips.retain(|other| other.network() != lpips.network());
@@ -39,7 +39,7 @@ impl Scorer {
         self
     }
 
-    /// Returns what is measured, in the order of tables.
+    /// Returns the metrics that are measured, in the order of tables.
     #[must_use]
     pub fn metrics(&self) -> Vec<Metric> {
         let mut metrics = vec![Metric::Psnr, Metric::Ssim];
@@ -51,10 +51,11 @@ impl Scorer {
         metrics
     }
 
-    /// Scores picture `b` against `a`. The score's name is `name`.
+    /// Scores picture `b` against `a`. The score is called `name`.
     ///
     /// # Errors
-    /// [`lexisplat_compress::Error::Parameter`] if their sizes differ or are too small for a network, or if one has NaN.
+    /// [`lexisplat_compress::Error::Parameter`] if the sizes of the pictures differ or are too small for a network, or if
+    /// a picture has NaN.
     pub fn score(&self, name: &str, a: &Image, b: &Image) -> Result<ViewScore> {
         let psnr = psnr(a, b)?;
         let identical = psnr.is_none();
@@ -72,7 +73,7 @@ impl Scorer {
     }
 }
 
-/// Returns the metrics of a network, and the range of values that each gives it.
+/// Returns the metrics of a network, each with its range of pixel values.
 fn lpips_metrics(network: Network) -> [(Metric, Range); 2] {
     match network {
         Network::Vgg => [(Metric::LpipsVgg, Range::Standard), (Metric::LpipsVggInria, Range::Inria)],

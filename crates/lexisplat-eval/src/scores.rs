@@ -12,9 +12,9 @@ use crate::metrics::Metric;
 pub struct ViewScore {
     /// The camera's name.
     pub name: String,
-    /// Picture size in pixels.
+    /// Width of the picture, in pixels.
     pub width: u32,
-    /// Picture size in pixels.
+    /// Height of the picture, in pixels.
     pub height: u32,
     /// PSNR in dB; `None` if the pictures are identical.
     pub psnr: Option<f64>,
@@ -22,14 +22,14 @@ pub struct ViewScore {
     pub ssim: f64,
     /// Whether the clipped pictures are identical.
     pub identical: bool,
-    /// All other metrics that were measured.
+    /// Values of all other metrics that were measured.
     #[serde(flatten)]
     pub more: BTreeMap<Metric, f64>,
 }
 
 impl ViewScore {
-    /// Returns the score of a view whose `size` is width and height in pixels. Without a `psnr`, in dB, the
-    /// pictures are identical.
+    /// Returns the score of a view whose picture has the `size` width and height, in pixels. `psnr` is in dB; `None`
+    /// means that the pictures are identical.
     #[must_use]
     pub fn new(
         name: &str,
@@ -42,7 +42,7 @@ impl ViewScore {
         Self { name: name.to_owned(), width, height, psnr, ssim, identical, more }
     }
 
-    /// Returns the value of `metric` if it was measured. The PSNR of identical pictures is infinite and `None`.
+    /// Returns the value of `metric`; `None` if it was not measured, and for the infinite PSNR of identical pictures.
     #[must_use]
     pub fn get(&self, metric: Metric) -> Option<f64> {
         match metric {
@@ -58,17 +58,17 @@ impl ViewScore {
 pub struct Summary {
     /// Arithmetic mean.
     pub mean: Option<f64>,
-    /// Smallest.
+    /// Smallest value.
     pub min: Option<f64>,
-    /// Largest.
+    /// Largest value.
     pub max: Option<f64>,
 }
 
-/// The name of a part of a summary, and how to get it.
+/// The name of a part of a summary, and the function that returns the part.
 type Part = (&'static str, fn(&Summary) -> Option<f64>);
 
 impl Summary {
-    /// The names of the parts, and how to get them.
+    /// The names of the parts, and the functions that return them.
     pub const PARTS: [Part; 3] = [("mean", |s| s.mean), ("minimum", |s| s.min), ("maximum", |s| s.max)];
 
     /// Returns the summary of `values`.
@@ -87,16 +87,16 @@ impl Summary {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Comparison {
-    /// Whether every view is identical.
+    /// Whether the pictures of every view are identical.
     pub identical: bool,
-    /// PSNR over the views that are not identical. An identical view has an infinite PSNR.
+    /// Summary of PSNR over the views that are not identical. Identical views have an infinite PSNR.
     pub psnr: Summary,
-    /// SSIM over all views.
+    /// Summary of SSIM over all views.
     pub ssim: Summary,
-    /// All other metrics that were measured, over all views.
+    /// Summaries of all other metrics that were measured, over all views.
     #[serde(flatten)]
     pub more: BTreeMap<Metric, Summary>,
-    /// Each view, in the cameras' order.
+    /// Score of each view, in the order of the cameras.
     pub views: Vec<ViewScore>,
 }
 
@@ -118,7 +118,7 @@ impl Comparison {
         }
     }
 
-    /// Returns the summary of `metric` if it was measured.
+    /// Returns the summary of `metric`; `None` if it was not measured.
     #[must_use]
     pub fn get(&self, metric: Metric) -> Option<Summary> {
         match metric {

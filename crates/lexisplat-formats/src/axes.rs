@@ -1,45 +1,47 @@
-//! Axes that point the other way.
+//! Changes of the directions of axes.
 //!
-//! A trainer's PLY has x right, y down, z forward (RDF); SPZ and glTF have y up and z back (RUB). Half a turn about x leads
-//! from one to the other. In general each axis keeps its sign or changes it; if one or three change, the scene is mirrored.
+//! A trainer's PLY has x right, y down, z forward (RDF); SPZ and glTF have y up and z back (RUB). Half a turn about x
+//! leads from one to the other. In general each axis keeps its sign or changes it. If one or three axes change their
+//! signs, the scene is mirrored.
 
 use lexisplat::sh::MAX_COEFFICIENTS;
 
-/// The signs that the three axes get.
+/// The factors 1 or -1 on the three axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Flip([f32; 3]);
 
 impl Flip {
-    /// Between RDF and RUB.
+    /// The change between RDF and RUB.
     pub(crate) const HALF_TURN: Self = Self([1.0, -1.0, -1.0]);
 
-    /// The axes whose entry is true change their signs.
+    /// Returns the change of the axes whose entry is true.
     pub(crate) fn of(changes: [bool; 3]) -> Self {
         Self(changes.map(|change| if change { -1.0 } else { 1.0 }))
     }
 
-    /// A position along the flipped axes.
+    /// Returns a position along the changed axes.
     pub(crate) fn position(self, position: [f32; 3]) -> [f32; 3] {
         [0, 1, 2].map(|k| self.0[k] * position[k])
     }
 
-    /// The factors on the parts (x, y, z) of a quaternion: those of the planes that are turned in.
+    /// Returns the factors on the parts (x, y, z) of a quaternion. Each is the product of the factors on the two other
+    /// axes, which span the plane of rotation.
     pub(crate) fn turns(self) -> [f32; 3] {
         let [x, y, z] = self.0;
         [y * z, x * z, x * y]
     }
 
-    /// A rotation (w, x, y, z) of the same ellipsoid along the flipped axes.
+    /// Returns a rotation (w, x, y, z) of the same ellipsoid along the changed axes.
     pub(crate) fn rotation(self, [w, x, y, z]: [f32; 4]) -> [f32; 4] {
         let [a, b, c] = self.turns();
         [w, a * x, b * y, c * z]
     }
 
-    /// The factors on SH-rest, in the order of one channel.
+    /// Returns the factors on SH-rest, in the order of one channel.
     ///
-    /// Function m of degree l is the real part of (x + i y)^m times a polynomial of z for m of 0 and more, the imaginary
-    /// part of (x + i y)^|m| for others. Its sign changes with x, y and z as these are odd in them; with all three it
-    /// changes as l is odd.
+    /// Function m of degree l is the real part of (x + i y)^m times a polynomial of z for m >= 0, and the imaginary part
+    /// of (x + i y)^|m| times a polynomial of z for m < 0. When x, y or z changes its sign, the function changes its sign
+    /// if it is odd in that coordinate. When all three change, the function changes its sign if l is odd.
     pub(crate) fn rest(self) -> [f32; MAX_COEFFICIENTS - 1] {
         let mut signs = [1.0; MAX_COEFFICIENTS - 1];
         let (mut l, mut k) = (1_i32, 0);

@@ -1,25 +1,25 @@
-//! Changes of a whole scene: cut, scaled, turned, moved, of a lower SH degree.
+//! Changes of a whole scene: a lower SH degree, crops, scaling, rotation and translation.
 
 use lexisplat::{Error, Offset, Result, ShDegree, Splats};
 
 use crate::turn_sh::ShRotation;
 
-/// Changes, made in the order of the fields. All are along the axes of a trainer's PLY, in the world of the scene's file: a
-/// scene's offset counts.
+/// Changes of a scene, which are made in the order of the fields. Coordinates are along the axes of a trainer's PLY, in
+/// the world of the scene's file: the scene's offset is part of a position.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Edits {
-    /// SH above this degree are cut off.
+    /// Highest SH degree to keep. SH of higher degrees are cut off.
     pub degree: Option<ShDegree>,
-    /// Corners of a box, the lower ones first. Gaussians whose centres are outside are left out.
+    /// Corners of a box, the lower corner first. Gaussians whose centres are outside are removed.
     pub crop_box: Option<[[f64; 3]; 2]>,
-    /// Centre and radius of a sphere. Gaussians whose centres are outside are left out.
+    /// Centre and radius of a sphere. Gaussians whose centres are outside are removed.
     pub crop_sphere: Option<([f64; 3], f64)>,
-    /// Factor on positions and sizes, above 0.
+    /// Factor on positions and scales, above 0.
     pub scale: Option<f64>,
-    /// Angles of rotations about x, then y, then z, through the origin, in degrees.
+    /// Angles of rotations about the axes x, then y, then z, through the origin, in degrees.
     pub rotate: Option<[f64; 3]>,
-    /// Added to positions, in double precision ([`Splats::translate`]).
+    /// Vector that is added to positions, in double precision ([`Splats::translate`]).
     pub translate: Option<[f64; 3]>,
 }
 
@@ -27,8 +27,8 @@ impl Edits {
     /// Makes the changes.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a scale that is not above 0, values that are not finite, changes after which a position is not
-    /// finite, and a box or sphere that leaves no Gaussian.
+    /// [`Error::Parameter`] for a scale that is not above 0, for values that are not finite, for changes that make a
+    /// position not finite, and for a box or sphere that leaves no Gaussian.
     pub fn apply(&self, splats: &mut Splats) -> Result<()> {
         self.check()?;
         if let Some(degree) = self.degree.filter(|degree| *degree < splats.degree) {
@@ -76,18 +76,18 @@ impl Edits {
         finite("translate", self.translate)
     }
 
-    /// What is cut to, for messages.
+    /// Returns the box and the sphere as text, for messages.
     fn crops(&self) -> String {
         let crop_box = self.crop_box.map(|corners| format!("box {corners:?}"));
         let sphere = self.crop_sphere.map(|(centre, radius)| format!("sphere {centre:?} of radius {radius}"));
         crop_box.into_iter().chain(sphere).collect::<Vec<_>>().join(" and ")
     }
 
-    /// Whether a Gaussian at `position`, relative to `offset`, is within box and sphere.
+    /// Returns whether a Gaussian at `position`, relative to `offset`, is inside the box and the sphere.
     fn keeps(&self, position: [f32; 3], offset: Option<Offset>) -> bool {
         let numbers = Offset::numbers(offset);
         let position = [0, 1, 2].map(|k| f64::from(position[k]) + numbers[k]);
-        // A side that is given as 0.1 means the number that single precision has for it, unless doubles are beside it.
+        // Without an offset, a limit such as 0.1 is rounded to single precision, as positions are.
         let rounded = |v: f64| if offset.is_some() { v } else { f64::from(single(v)) };
         let in_box = |[low, high]: [[f64; 3]; 2]| {
             (0..3).all(|k| (rounded(low[k])..=rounded(high[k])).contains(&position[k]))
@@ -112,13 +112,13 @@ fn scale_by(splats: &mut Splats, scale: f64) {
     geometry.scales.as_flattened_mut().iter_mut().for_each(|v| *v += more);
 }
 
-/// The quaternion (w, x, y, z) of rotations by `angles`, in degrees, about x, then y, then z.
+/// Returns the quaternion (w, x, y, z) of rotations by `angles`, in degrees, about x, then y, then z.
 fn quaternion(angles: [f64; 3]) -> [f64; 4] {
     let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(|angle| libm::sincos(angle.to_radians() / 2.0));
     product([cz, 0.0, 0.0, sz], product([cy, 0.0, sy, 0.0], [cx, sx, 0.0, 0.0]))
 }
 
-/// The rotation by `b` and then by `a`.
+/// Returns the rotation by `b` followed by the rotation by `a`.
 pub(crate) fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     let ([aw, ax, ay, az], [bw, bx, by, bz]) = (a, b);
     [
@@ -129,7 +129,7 @@ pub(crate) fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
     ]
 }
 
-/// `v` turned by the quaternion `q`, of length 1.
+/// Returns `v` rotated by the quaternion `q`, of length 1.
 pub(crate) fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let [w, x, y, z] = q;
     let cross = |a: [f64; 3], b: [f64; 3]| {
@@ -141,7 +141,7 @@ pub(crate) fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| v[k] + 2.0 * (w * once[k] + twice[k]))
 }
 
-/// Turns a scene about the origin by the quaternion `q`, of length 1.
+/// Rotates a scene about the origin by the quaternion `q`, of length 1.
 pub(crate) fn rotate_by(splats: &mut Splats, q: [f64; 4]) {
     let geometry = &mut splats.geometry;
     for v in geometry.positions.iter_mut().chain(&mut geometry.normals) {

@@ -1,4 +1,4 @@
-//! What format a file is in.
+//! Recognises the format of a file.
 
 use std::fmt;
 
@@ -14,18 +14,18 @@ use crate::{compressed_ply, gltf, ksplat, splat};
 pub enum Kind {
     /// The PLY of trainers.
     Ply,
-    /// This project's own.
+    /// This project's own format.
     Lexi,
     /// Niantic's SPZ, versions 1 to 4.
     Spz,
-    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures; or streamed SOG, version 1:
-    /// `lod-meta.json` in a folder of those.
+    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures. Also streamed SOG, version 1:
+    /// `lod-meta.json` in a folder with folders of SOGs.
     Sog,
     /// `PlayCanvas`' compressed PLY.
     CompressedPly,
-    /// The rows of 32 bytes of antimatter15's viewer.
+    /// Rows of 32 bytes, the format of antimatter15's viewer.
     Splat,
-    /// The `.ksplat` of mkkellogg's viewer, compression levels 0 to 2.
+    /// `.ksplat`, the format of mkkellogg's viewer, compression levels 0 to 2.
     Ksplat,
     /// glTF 2.0 with `KHR_gaussian_splatting`: a glb, or JSON with its data inside.
     Gltf,
@@ -48,7 +48,8 @@ impl Kind {
     pub const WRITTEN: [Self; 6] =
         [Self::Ply, Self::Spz, Self::Sog, Self::CompressedPly, Self::Splat, Self::Gltf];
 
-    /// The format of the file that has `bytes` and is called `name`. Only if the bytes say nothing the name decides.
+    /// Returns the format of a file with the content `bytes` and the name `name`. The name decides only if the content
+    /// does not tell the format.
     #[must_use]
     pub fn of(name: &str, bytes: &[u8]) -> Option<Self> {
         let bytes = without_byte_order_mark(bytes);
@@ -68,7 +69,7 @@ impl Kind {
         if bytes.starts_with(&[0x1f, 0x8b]) {
             return Some(Self::Spz);
         }
-        // Rows of a .splat may begin as JSON does.
+        // Rows of a .splat may begin like JSON.
         let is_json = bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{');
         let json = || of_json(bytes).or(Self::of_extension(name).filter(|kind| *kind == Self::Gltf));
         if let Some(kind) = is_json.then(json).flatten() {
@@ -83,11 +84,11 @@ impl Kind {
         Self::of_extension(name).filter(|kind| matches!(kind, Self::Splat | Self::Ksplat))
     }
 
-    /// The format that files called `name` have by their extension.
+    /// Returns the format of files called `name`, by the extension.
     #[must_use]
     pub fn of_extension(name: &str) -> Option<Self> {
         let name = name.to_ascii_lowercase();
-        // The longest first: a compressed.ply is called .ply too.
+        // The longest extension comes first, because a compressed.ply ends with .ply too.
         let ends = [
             (".compressed.ply", Self::CompressedPly),
             (".ply", Self::Ply),
@@ -102,7 +103,7 @@ impl Kind {
         ends.into_iter().find(|(end, _)| name.ends_with(end)).map(|(_, kind)| kind)
     }
 
-    /// The extension of files of this format, which also names it in options.
+    /// Returns the extension of files of this format. It is also the name of the format in options.
     #[must_use]
     pub fn extension(self) -> &'static str {
         match self {
@@ -133,7 +134,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// Names in a file of JSON that tell what it is.
+/// Names in a JSON file that tell its format.
 #[derive(Deserialize)]
 struct Marks {
     asset: Option<IgnoredAny>,
@@ -143,12 +144,12 @@ struct Marks {
     quats: Option<IgnoredAny>,
 }
 
-/// The format of a file of JSON.
+/// Returns the format of a JSON file.
 fn of_json(bytes: &[u8]) -> Option<Kind> {
     let marks: Marks = serde_json::from_slice(bytes).ok()?;
     let is_sog = marks.means.is_some() && marks.quats.is_some();
     let is_streamed_sog = marks.filenames.is_some() && marks.tree.is_some();
-    // Both have an `asset` too.
+    // Both have an `asset` too, so they are tested first.
     if is_sog || is_streamed_sog {
         return Some(Kind::Sog);
     }

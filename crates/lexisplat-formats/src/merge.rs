@@ -1,10 +1,12 @@
-//! Several scenes as one.
+//! Merges scenes into one.
 
 use lexisplat::{Splats, unite};
 
-/// Appends `next` to `scene`. SH of the lower degree become those of the higher one, with zeros. Extra properties that
-/// both do not have with the same names and types are left out; their names are returned. Comments are those of both,
-/// without repetitions. Positions are relative to one offset ([`unite`]).
+/// Appends `next` to `scene`.
+///
+/// SH of the lower degree are raised to the higher degree, with zeros. Extra properties that do not exist in both scenes
+/// with the same name and type are removed; their names are returned. Comments are those of both scenes, without
+/// repetitions. Positions become relative to one offset ([`unite`]).
 pub fn merge(scene: &mut Splats, mut next: Splats) -> Vec<String> {
     unite(scene, &mut next);
     raise(scene, &next);
@@ -22,7 +24,7 @@ pub fn merge(scene: &mut Splats, mut next: Splats) -> Vec<String> {
         }
     }
     ours.retain(|extra| theirs.iter().any(|other| same(extra, other)));
-    // In our order.
+    // The extras are sorted into the order of those of `scene`.
     let order = |extra: &lexisplat::Extra| ours.iter().position(|other| same(extra, other));
     theirs.retain(|extra| order(extra).is_some());
     theirs.sort_by_key(|extra| order(extra));
@@ -41,7 +43,7 @@ pub fn merge(scene: &mut Splats, mut next: Splats) -> Vec<String> {
     lost
 }
 
-/// Gives `scene` the degree of `other` if that is higher.
+/// Raises the SH degree of `scene` to that of `other`, if that is higher.
 fn raise(scene: &mut Splats, other: &Splats) {
     if scene.degree >= other.degree {
         return;

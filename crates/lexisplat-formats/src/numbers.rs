@@ -1,11 +1,11 @@
 //! Numbers in headers, which are little-endian.
 
-/// The number at byte `at` of `bytes`; 0 if it is not there.
+/// Returns the number at byte `at` of `bytes`; 0 if `bytes` is too short.
 pub(crate) fn u16_at(bytes: &[u8], at: usize) -> u16 {
     bytes.get(at..).and_then(|rest| rest.first_chunk()).map_or(0, |chunk| u16::from_le_bytes(*chunk))
 }
 
-/// As [`u16_at`].
+/// Returns a number like [`u16_at`].
 pub(crate) fn u32_at(bytes: &[u8], at: usize) -> u32 {
     bytes.get(at..).and_then(|rest| rest.first_chunk()).map_or(0, |chunk| u32::from_le_bytes(*chunk))
 }

@@ -1,11 +1,11 @@
-//! Opacities of 8 bits and as shares, and before the sigmoid.
+//! Opacities in 8 bits, as shares, and before the sigmoid.
 
 use lexisplat::SURE_OPACITY;
 
-/// Bits of an 8-bit opacity or colour: its largest value.
+/// Largest value of an 8-bit opacity or colour.
 pub(crate) const MOST: f32 = 255.0;
 
-/// The opacity before the sigmoid of `share`, 0 to 1. It is infinite for 0 and 1, and below and above.
+/// Returns the opacity before the sigmoid of `share`. It is infinite for shares up to 0 and from 1 on.
 pub(crate) fn logit(share: f32) -> f32 {
     if share <= 0.0 {
         f32::NEG_INFINITY
@@ -16,17 +16,17 @@ pub(crate) fn logit(share: f32) -> f32 {
     }
 }
 
-/// The share of 0 to 1 that `opacity`, which is before the sigmoid, means.
+/// Returns the opacity as a share, 0 to 1, for `opacity` before the sigmoid.
 pub(crate) fn sigmoid(opacity: f32) -> f32 {
     1.0 / (1.0 + libm::expf(-opacity.clamp(-SURE_OPACITY, SURE_OPACITY)))
 }
 
-/// The opacities before the sigmoid of all 8-bit opacities; infinite at both ends.
+/// Returns the opacities before the sigmoid of all 8-bit opacities. The first and the last are infinite.
 pub(crate) fn logits() -> [f32; 256] {
     std::array::from_fn(|k| logit(k as f32 / MOST))
 }
 
-/// `share` of 0 to 1 as 8 bits, rounded to the nearest.
+/// Returns `share`, from 0 to 1, in 8 bits, rounded to the nearest.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to 8 bits")]
 pub(crate) fn to_byte(share: f32) -> u8 {
     (share * MOST).round().clamp(0.0, MOST) as u8

@@ -11,10 +11,10 @@ use crate::source::FormatSource;
 use crate::unknown::unknown;
 use crate::{compressed_ply, gltf, ksplat, sog, splat, spz};
 
-/// Why a file without Gaussians is not written in another form.
+/// Reason why a file without Gaussians is not written in another form.
 const NONE_LEFT: &str = "no Gaussian is left of it, so there is nothing to write";
 
-/// A scene of any format, opened.
+/// An open scene of any format.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Opened<'a> {
@@ -27,7 +27,7 @@ pub enum Opened<'a> {
 }
 
 impl Opened<'_> {
-    /// The format.
+    /// Returns the format.
     #[must_use]
     pub fn kind(&self) -> Kind {
         match self {
@@ -37,7 +37,7 @@ impl Opened<'_> {
         }
     }
 
-    /// The scene, to read.
+    /// Returns the scene for reading.
     #[must_use]
     pub fn source(&self) -> &dyn SplatSource {
         match self {
@@ -47,10 +47,10 @@ impl Opened<'_> {
         }
     }
 
-    /// The scene, to write in another form. Messages call its file `name`.
+    /// Returns the scene for writing in another form. Messages call its file `name`.
     ///
     /// # Errors
-    /// [`Error::Format`] if it has no Gaussians, or all were left out.
+    /// [`Error::Format`] if the scene has no Gaussians, or all were left out.
     pub fn some(&self, name: &str) -> Result<&dyn SplatSource> {
         let source = self.source();
         match source.is_empty() {
@@ -60,12 +60,12 @@ impl Opened<'_> {
     }
 }
 
-/// Opens the scene in `bytes`, of any format, which its content tells; messages call it `name`. A scene of several
-/// files takes the others from `siblings`. `whole` says that the
-/// whole scene will be held anyway ([`PlySource::open_whole`]). Reports [`Stage::Read`](lexisplat::Stage::Read).
+/// Opens the scene in `bytes`. The format is recognised by content. Messages call the file `name`. The other files of a
+/// scene of several files come from `siblings`. `whole` tells that the whole scene will be held in memory anyway
+/// ([`PlySource::open_whole`]). Reports [`Stage::Read`](lexisplat::Stage::Read) to `progress`.
 ///
 /// # Errors
-/// [`Error::Format`] for bytes of no known format, and what the reader of the format says.
+/// [`Error::Format`] for bytes of no known format, and errors of the reader of the format.
 pub fn open<'a>(
     name: &'a str,
     bytes: &'a [u8],
@@ -78,7 +78,7 @@ pub fn open<'a>(
     let mut sizes = Sizes::of(bytes.len());
     let bytes = without_byte_order_mark(bytes);
     let file = match kind {
-        // The PLY reader refuses other files by what they are.
+        // The PLY reader refuses other files with an error that names their format.
         None | Some(Kind::Ply) => {
             if kind.is_none() && FileKind::of(name, bytes) == FileKind::Unknown {
                 return Err(Error::malformed(name, unknown(bytes)));

@@ -1,4 +1,4 @@
-//! What a reader of a format gives: Gaussians that any range can be decoded of.
+//! The interface of format readers: Gaussians, of which any range can be decoded.
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -6,13 +6,13 @@ use std::ops::Range;
 use lexisplat::{SceneMeta, ShDegree};
 use serde_json::Value;
 
-/// Gaussians in the bytes of a file, or in bytes that were inflated from it.
+/// Gaussians in the bytes of a file, or in bytes that were inflated from a file.
 pub(crate) trait Rows: Debug + Send + Sync {
-    /// Decodes Gaussians `range` into `out`, whose arrays have as many entries. All have the axes of a trainer's PLY.
-    /// Opacities may be infinite. The range is within the scene.
+    /// Decodes Gaussians `range` into `out`, whose arrays must have the length of the range. Values have the axes of a
+    /// trainer's PLY. Opacities may be infinite. The range must be within the scene.
     fn fill(&self, range: Range<usize>, out: RowsMut<'_>);
 
-    /// Whether all values but opacities are finite, whatever the bytes are.
+    /// Returns whether all values but opacities are finite for any content of the bytes.
     fn is_finite(&self) -> bool;
 }
 
@@ -20,20 +20,20 @@ pub(crate) trait Rows: Debug + Send + Sync {
 #[derive(Debug)]
 pub(crate) struct RowsMut<'a> {
     pub(crate) positions: &'a mut [[f32; 3]],
-    /// SH coefficient 0.
+    /// SH coefficient 0 of each channel.
     pub(crate) dc: &'a mut [[f32; 3]],
-    /// Before the sigmoid.
+    /// Opacities before the sigmoid.
     pub(crate) opacities: &'a mut [f32],
-    /// Natural logarithms.
+    /// Natural logarithms of the standard deviations.
     pub(crate) scales: &'a mut [[f32; 3]],
-    /// (w, x, y, z).
+    /// Quaternions (w, x, y, z).
     pub(crate) rotations: &'a mut [[f32; 4]],
-    /// `degree.rest()` values a Gaussian, channel-major within each.
+    /// SH-rest: `degree.rest()` values of each Gaussian, channel-major.
     pub(crate) sh_rest: &'a mut [f32],
 }
 
 impl RowsMut<'_> {
-    /// The same arrays for a while.
+    /// Returns the same arrays with a shorter lifetime.
     pub(crate) fn reborrow(&mut self) -> RowsMut<'_> {
         RowsMut {
             positions: self.positions,
@@ -47,7 +47,7 @@ impl RowsMut<'_> {
 }
 
 impl<'a> RowsMut<'a> {
-    /// Takes away the first `n` Gaussians, of `rest` values of SH-rest each.
+    /// Splits off the first `n` Gaussians, which have `rest` values of SH-rest each.
     pub(crate) fn take(&mut self, n: usize, rest: usize) -> Self {
         fn split<'a, T>(from: &mut &'a mut [T], n: usize) -> &'a mut [T] {
             from.split_off_mut(..n).unwrap_or_default()
@@ -63,7 +63,7 @@ impl<'a> RowsMut<'a> {
     }
 }
 
-/// A file whose header is valid and whose Gaussians are all there.
+/// A file with a valid header and with all its Gaussians.
 #[derive(Debug)]
 pub(crate) struct Described<'a> {
     pub(crate) rows: Box<dyn Rows + 'a>,
@@ -71,8 +71,8 @@ pub(crate) struct Described<'a> {
     pub(crate) len: usize,
     pub(crate) degree: ShDegree,
     pub(crate) meta: SceneMeta,
-    /// What is odd about the file, one sentence each.
+    /// Oddities of the file, one sentence each.
     pub(crate) warnings: Vec<String>,
-    /// What `lexisplat info` says of the file, in order: names as in JSON, and values.
+    /// Facts about the file for `lexisplat info`, in order: names of JSON members, and values.
     pub(crate) facts: Vec<(&'static str, Value)>,
 }

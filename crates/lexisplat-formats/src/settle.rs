@@ -1,10 +1,10 @@
-//! Codes that come back: what is read and written again has the same bits.
+//! Codes that are stable: values that are read and written again have the same bits.
 
-/// Most rounds until nothing changes.
+/// Largest number of rounds until a code is stable.
 const ROUNDS: usize = 8;
 
-/// Encodes on from `first` until decoding and encoding again gives the same. If codes take turns, it is the smallest of
-/// them.
+/// Returns a stable code: encodes again, beginning with `first`, until decoding and encoding gives the same code. If
+/// several codes alternate, the smallest of them is returned.
 pub(crate) fn settled<T: Copy + Ord>(first: T, again: impl Fn(T) -> T) -> T {
     let mut code = first;
     for _ in 0..ROUNDS {

@@ -1,4 +1,4 @@
-//! Files beside the one that is opened, for formats of several files.
+//! Files beside the opened file, for formats of several files.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -6,23 +6,25 @@ use std::path::Path;
 
 use lexisplat::{Error, Input, Limits, Result, file_inside};
 
-/// Names of the file of a folder that is a scene ([`Kind::Sog`](crate::Kind::Sog)): of one SOG, and of a streamed one.
+/// Names of the file that makes a folder a scene ([`Kind::Sog`](crate::Kind::Sog)): of a SOG, and of a streamed SOG.
 const INDICES: [&str; 2] = ["meta.json", "lod-meta.json"];
-/// Most bytes of a file beside a scene: a WebP counts its own in 32 bits, after 8 of them (RFC 9649, 2.4).
+/// Largest size of a file beside a scene, in bytes. The header of a WebP has 32 bits for the number of bytes after its
+/// first 8 bytes (RFC 9649, 2.4).
 const MOST_BYTES: u64 = u32::MAX as u64 + 8;
-/// Most folders between the folder of a scene and a file of it.
+/// Largest number of folders between the folder of a scene and one of its files.
 const MOST_FOLDERS: usize = 8;
-/// Most bytes of a name, as file systems have it (`NAME_MAX`).
+/// Largest number of bytes of a name, as in file systems (`NAME_MAX`).
 const MOST_NAME: usize = 255;
 
 /// Reads a file by its plain name.
 type Read<'a> = dyn Fn(&str, &Limits) -> Result<Input> + Sync + 'a;
 
-/// Where the files lie that a file names.
+/// The place of the files that a scene's file names.
 ///
-/// A file of a scene comes from outside, and so do the names in it and the files there. Names may only be plain: without
-/// separators, drives and addresses, and neither `.` nor `..`; those of a streamed SOG may have folders that are. Only regular
-/// files are read that are inside of the one folder when links are followed ([`file_inside`]).
+/// The file of a scene may come from anybody, and so may the names in it and the files around it. Names must be plain:
+/// without separators, drives and addresses, and neither `.` nor `..`. Names of a streamed SOG may have plain folders
+/// before them. Only regular files are read, and only if they are inside the one folder after links are followed
+/// ([`file_inside`]).
 #[derive(Clone, Copy)]
 pub struct Siblings<'a>(From<'a>);
 
@@ -34,7 +36,7 @@ enum From<'a> {
 }
 
 impl<'a> Siblings<'a> {
-    /// No other files: a scene that names some is refused.
+    /// No other files: a scene that names other files is refused.
     pub const NONE: Siblings<'static> = Siblings(From::Nowhere);
 
     /// The files in the folder of the file `path`.
@@ -44,13 +46,14 @@ impl<'a> Siblings<'a> {
         Self(From::Folder(folder.unwrap_or(Path::new("."))))
     }
 
-    /// The files that `read` gives by their plain names, within the limits. Those of a streamed SOG have `/` between folders.
+    /// Files that `read` returns by their plain names, within the limits. Names of a streamed SOG have `/` between
+    /// folders.
     #[must_use]
     pub fn given(read: &'a Read<'a>) -> Self {
         Self(From::Given(read))
     }
 
-    /// The file `path` beside `file`, or in folders beside it, with `/` between them.
+    /// Reads the file `path`, which is beside `file` or in folders beside it. `path` has `/` between folders.
     pub(crate) fn read_below(&self, file: &str, path: &str, limits: &Limits) -> Result<Input> {
         path.split('/').try_for_each(|name| check_plain(file, name))?;
         if path.split('/').count() > MOST_FOLDERS + 1 {
@@ -78,7 +81,7 @@ impl fmt::Debug for Siblings<'_> {
     }
 }
 
-/// Refuses `name`, which `file` says, if it leads out of a folder.
+/// Returns an error if `name`, which is written in `file`, could lead out of a folder.
 pub(crate) fn check_plain(file: &str, name: &str) -> Result<()> {
     let bad = |c: char| matches!(c, '/' | '\\' | ':') || c.is_control();
     if name.is_empty() || name.len() > MOST_NAME || matches!(name, "." | "..") || name.contains(bad) {
@@ -89,7 +92,8 @@ pub(crate) fn check_plain(file: &str, name: &str) -> Result<()> {
     Ok(())
 }
 
-/// The file to open for `path`: `meta.json` or `lod-meta.json` for a folder that has it, else `path` itself.
+/// Returns the file to open for `path`: the `meta.json` or `lod-meta.json` of a folder that has one, otherwise `path`
+/// itself.
 #[must_use]
 pub fn scene_path(path: &Path) -> Cow<'_, Path> {
     let index = INDICES.map(|name| path.join(name)).into_iter().find(|index| index.is_file());

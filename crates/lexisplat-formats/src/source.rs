@@ -1,4 +1,4 @@
-//! A file of another format as a source of splats.
+//! A file of another format than PLY or .lexi as a source of splats.
 
 use std::ops::Range;
 
@@ -9,28 +9,28 @@ use serde_json::Value;
 use crate::rows::{Described, RowsMut};
 use crate::sog::Sizes;
 
-/// Gaussians that one task decodes.
+/// Number of Gaussians that one task decodes.
 const GAUSSIANS_PER_TASK: usize = 8192;
-/// Gaussians looked at together when a file is opened.
+/// Number of Gaussians that are checked together when a file is opened.
 const SCAN: usize = 8 * GAUSSIANS_PER_TASK;
-/// Bytes of a Gaussian's position, base colour, opacity, scales and rotation.
+/// Number of bytes of a Gaussian's position, base colour, opacity, scales and rotation.
 const GEOMETRY_BYTES: usize = (3 + 3 + 1 + 3 + 4) * size_of::<f32>();
-/// Names of the arrays in errors, in the order of a PLY: those of a Gaussian's first property of each.
+/// Names of the arrays in errors, in the order of a PLY. Each is the name of the first property of the array.
 const PROPERTIES: [&str; 6] = ["x", "f_dc_0", "f_rest_0", "opacity", "scale_0", "rot_0"];
 
-/// A file of another format, whose Gaussians are read a part at a time.
+/// A file of another format than PLY or .lexi. Its Gaussians are read a part at a time.
 #[derive(Debug)]
 pub struct FormatSource<'a> {
     name: String,
     sizes: Sizes,
     limits: Limits,
     file: Described<'a>,
-    /// Gaussians left out, ascending.
+    /// Indices of the Gaussians left out, in ascending order.
     dropped: Vec<usize>,
 }
 
 impl<'a> FormatSource<'a> {
-    /// Looks once at all values of `file`, called `name`, of these sizes.
+    /// Checks all values of `file` once. The file is called `name` and has these sizes.
     pub(crate) fn new(
         name: &str,
         sizes: Sizes,
@@ -76,13 +76,13 @@ impl<'a> FormatSource<'a> {
         Ok(())
     }
 
-    /// What `lexisplat info` says of the file, in order: names as in JSON, and values.
+    /// Returns the facts about the file for `lexisplat info`, in order: names of JSON members, and values.
     #[must_use]
     pub fn facts(&self) -> &[(&'static str, Value)] {
         &self.file.facts
     }
 
-    /// Decodes all Gaussians `rows` of the file into `part`, those that are left out too.
+    /// Decodes Gaussians `rows` of the file into `part`, including Gaussians that are left out.
     fn fill(&self, rows: Range<usize>, part: &mut Splats) -> Result<()> {
         let (n, rest) = (rows.len(), self.file.degree.rest());
         let each = GEOMETRY_BYTES + rest * size_of::<f32>();
@@ -111,9 +111,9 @@ impl<'a> FormatSource<'a> {
         Ok(())
     }
 
-    /// The row of Gaussian `gaussian`.
+    /// Returns the row in the file of Gaussian `gaussian`.
     fn row(&self, gaussian: usize) -> usize {
-        // `dropped[j] - j` Gaussians come before the dropped row number j.
+        // `dropped[j] - j` Gaussians come before row `dropped[j]`.
         let (mut low, mut high) = (0, self.dropped.len());
         while low < high {
             let middle = low.midpoint(high);
@@ -129,7 +129,7 @@ impl<'a> FormatSource<'a> {
 
 /// Resizes all arrays to `n` Gaussians. Their contents have no meaning afterwards.
 fn resize(part: &mut Splats, n: usize, rest: usize) {
-    /// New memory comes zeroed from the system. The threads that fill it are the first to touch it.
+    /// New memory comes zeroed from the system, so that the threads that fill it are the first to touch it.
     fn sized<T: Copy>(values: &mut Vec<T>, len: usize, zero: T) {
         if values.is_empty() {
             *values = vec![zero; len];
@@ -146,7 +146,7 @@ fn resize(part: &mut Splats, n: usize, rest: usize) {
     sized(&mut part.sh_rest, n * rest, 0.0);
 }
 
-/// The property of Gaussian `i` of `part` that holds a value which is not finite.
+/// Returns the name of the property of Gaussian `i` of `part` with a value that is not finite.
 fn not_finite(part: &Splats, i: usize) -> Option<&'static str> {
     let geometry = &part.geometry;
     let values: [&[f32]; 6] = [

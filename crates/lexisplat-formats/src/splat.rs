@@ -1,7 +1,7 @@
-//! `.splat`: rows of 32 bytes without a header, of antimatter15's viewer (`convert.py`, `main.js`).
+//! `.splat`: rows of 32 bytes without a header, the format of antimatter15's viewer (`convert.py`, `main.js`).
 //!
-//! A row is position (3 f32), scales (3 f32, linear), colour and opacity (4 u8), rotation w, x, y, z (4 u8, 128 is 0). It
-//! has a PLY's axes, and no SH.
+//! A row has the position (3 f32), the scales (3 f32, linear), the colour and opacity (4 u8), and the rotation w, x, y, z
+//! (4 u8, 128 is 0). The axes are those of a PLY. There are no SH.
 
 use std::ops::Range;
 
@@ -13,18 +13,19 @@ use crate::opacity::{MOST, logits, sigmoid, to_byte};
 use crate::rows::{Described, Rows, RowsMut};
 use crate::write::Lost;
 
-/// Bytes of a Gaussian.
+/// Number of bytes of a Gaussian.
 const ROW: usize = 32;
-/// Stands for 0 in a byte of a rotation, and for 1 above it (`convert.py`: `rot * 128 + 128`).
+/// Byte of a rotation that means 0; 128 more means 1 (`convert.py`: `rot * 128 + 128`).
 const ROTATION_ZERO: f32 = 128.0;
-/// Stands for a scale of 0, whose logarithm is not finite: below the logarithm of 2^-150, so its exponential rounds to 0.
+/// Logarithm of a scale that stands for a scale of 0, whose logarithm is not finite. It is below the logarithm of 2^-150,
+/// so its exponential rounds to 0.
 const LEAST_SCALE: f32 = -104.0;
-/// Rows that [`is_likely`] looks at.
+/// Number of rows that [`is_likely`] examines.
 const LOOKED_AT: usize = 64;
-/// Largest squared length of a rotation in bytes, of full length 128, that [`is_likely`] takes.
+/// Squared lengths of a rotation in bytes that [`is_likely`] accepts. The length of a unit rotation is 128.
 const ROTATION_SLACK: Range<f32> = 0.8 * 128.0 * 128.0..1.2 * 128.0 * 128.0;
 
-/// Whether `bytes` are rows of a .splat, as far as the first of them tell: nothing else marks the format.
+/// Returns whether `bytes` seem to be rows of a .splat. The format has no mark, so the first rows are examined.
 pub(crate) fn is_likely(bytes: &[u8]) -> bool {
     let likely = |row: &[u8; ROW]| {
         let position = floats(row, 0);

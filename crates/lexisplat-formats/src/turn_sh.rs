@@ -1,15 +1,15 @@
-//! SH coefficients of a turned scene.
+//! SH coefficients of a rotated scene.
 //!
-//! A turned scene shows from the turned direction R d what the scene shows from d. The coefficients of degree l of the
-//! turned scene are those of the scene times a matrix whose entries are the integrals of b(R d) b(d) over the sphere, with
-//! b the basis functions of that degree. The integrals are exact sums over few directions.
+//! A rotated scene shows in the rotated direction R d what the scene shows in direction d. The coefficients of degree l
+//! of the rotated scene are those of the scene times a matrix. Its entries are the integrals of b(R d) b(d) over the
+//! sphere, where b are the basis functions of that degree. The integrals are exact sums over few directions.
 
 use lexisplat::ShDegree;
 use lexisplat::sh::{MAX_COEFFICIENTS, MAX_DEGREE, rest_basis};
 
 use crate::edit::turned;
 
-/// Heights and weights of Gauss and Legendre's sums of five values, exact for polynomials of degree 9.
+/// Heights and weights of Gauss-Legendre quadrature with five values, which is exact for polynomials of degree 9.
 const HEIGHTS: [(f64, f64); 5] = [
     (0.0, 0.568_888_888_888_888_9),
     (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
@@ -17,8 +17,8 @@ const HEIGHTS: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
     (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
-/// Directions around each height. Sums over them are exact for angular frequencies up to 9; products of two basis functions
-/// have at most 8.
+/// Number of directions around each height. Sums over them are exact for angular frequencies up to 9. Products of two
+/// basis functions have at most 8.
 const AROUND: u32 = 10;
 /// Number of entries of the matrices of degrees 1 to 4.
 const ENTRIES: usize = 9 + 25 + 49 + 81;
@@ -26,17 +26,17 @@ const ENTRIES: usize = 9 + 25 + 49 + 81;
 /// A rotation of SH-rest.
 #[derive(Debug, Clone)]
 pub(crate) struct ShRotation {
-    /// The matrices of degrees 1 to 4, row by row, one after the other.
+    /// Matrices of degrees 1 to 4, row by row, one after the other.
     matrices: [f64; ENTRIES],
 }
 
-/// The first coefficient of `degree` among SH-rest, and their number.
+/// Returns the index of the first coefficient of `degree` among SH-rest, and the number of its coefficients.
 fn band(degree: usize) -> (usize, usize) {
     (degree * degree - 1, 2 * degree + 1)
 }
 
 impl ShRotation {
-    /// The rotation by the quaternion (w, x, y, z) `q`, of length 1.
+    /// Returns the rotation by the quaternion (w, x, y, z) `q`, of length 1.
     pub(crate) fn new(q: [f64; 4]) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "directions are in single precision")]
         let basis = |v: [f64; 3]| {
@@ -57,7 +57,7 @@ impl ShRotation {
         Self { matrices }
     }
 
-    /// Turns the SH-rest of one Gaussian: `degree.rest()` values, channel-major.
+    /// Rotates the SH-rest of one Gaussian: `degree.rest()` values, channel-major.
     pub(crate) fn apply(&self, degree: ShDegree, rest: &mut [f32]) {
         for channel in rest.chunks_exact_mut(degree.rest_per_channel().max(1)) {
             let mut matrices = &self.matrices[..];
@@ -76,7 +76,7 @@ impl ShRotation {
     }
 }
 
-/// Adds `share` times the products of the values `plain` and `seen` of basis functions to the matrices.
+/// Adds `share` times the products of the basis values `plain` and `seen` to the matrices.
 fn add_products(matrices: &mut [f64; ENTRIES], plain: &[f64], seen: &[f64], share: f64) {
     let mut entries = matrices.iter_mut();
     for l in 1..=usize::from(MAX_DEGREE) {

@@ -1,13 +1,14 @@
-//! What is said of a file of no known format.
+//! Messages about a file of no known format.
 
 /// The formats that are read.
 pub(crate) const FORMATS: &str = "PLY (3DGS, 2DGS), compressed.ply, .lexi, SPZ, SOG (.sog, meta.json, lod-meta.json), .splat, .ksplat, glTF (.glb, .gltf)";
-/// What a Git LFS pointer begins with (git-lfs, `docs/spec.md`).
+/// First bytes of a Git LFS pointer (git-lfs, `docs/spec.md`).
 const GIT_LFS: &[u8] = b"version https://git-lfs.github.com/spec/";
-/// What pages begin with, in lower case.
+/// Beginnings of web pages, in lower case.
 const PAGES: [&str; 3] = ["<!doctype html", "<html", "<head"];
 
-/// Why the file that begins with `bytes` is not read: what it is, if that can be told, and what is read.
+/// Returns why the file that begins with `bytes` cannot be read: its kind, if it can be told, and the formats that are
+/// read.
 pub(crate) fn unknown(bytes: &[u8]) -> String {
     let start = bytes.trim_ascii_start();
     let is_page =
@@ -21,7 +22,7 @@ pub(crate) fn unknown(bytes: &[u8]) -> String {
     format!("the format is not known; these are read: {FORMATS}")
 }
 
-/// Why an archive with these members is no SOG.
+/// Returns why an archive with these members is not a SOG.
 pub(crate) fn no_sog<'a>(members: impl Iterator<Item = &'a str> + Clone) -> String {
     let ends = |name: &str, end: &str| {
         name.len() >= end.len()

@@ -6,19 +6,20 @@ use serde::Serialize;
 use crate::kind::Kind;
 use crate::{compressed_ply, gltf, sog, splat, spz};
 
-/// How to write.
+/// Options of writing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct WriteOptions {
-    /// Version of SPZ: 2, 3 or 4. Default 4.
+    /// Version of SPZ: 2, 3 or 4. The default is 4.
     pub spz_version: u8,
-    /// Bits of SPZ's SH coefficients of degree 1, and of higher degrees, 1 to 8 each. Default 5 and 4, as its own library.
+    /// Number of bits of SPZ's SH coefficients of degree 1, and of the higher degrees, 1 to 8 each. The default is 5 and
+    /// 4, as in SPZ's own library.
     pub sh_bits: [u8; 2],
-    /// Most entries of SOG's palette of SH, up to 65,536, which is the default; 0 leaves SH out. There are no more than the
-    /// largest power of two that is no larger than the number of Gaussians.
+    /// Largest number of entries of SOG's palette of SH, up to 65,536, which is the default; 0 leaves SH out. The palette
+    /// also has no more entries than the largest power of two that does not exceed the number of Gaussians.
     pub sog_palette: u32,
-    /// Whether the splats of a glb are an SPZ (`KHR_gaussian_splatting_compression_spz_2`, a draft) and not floats. Default
-    /// false.
+    /// Whether the splats of a glb are an SPZ (`KHR_gaussian_splatting_compression_spz_2`, a draft) instead of floats.
+    /// The default is false.
     pub glb_spz: bool,
 }
 
@@ -28,30 +29,31 @@ impl Default for WriteOptions {
     }
 }
 
-/// What a written file lacks of its scene.
+/// The properties of a scene that a written file lacks.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct Lost {
     /// SH degrees of the scene and of the file, if the file's is lower.
     pub sh_degree: Option<[u8; 2]>,
-    /// Names of extra properties.
+    /// Names of extra properties that were left out.
     pub extras: Vec<String>,
     /// Whether normals were left out.
     pub normals: bool,
     /// Whether the mark of anti-aliasing was left out.
     pub antialiased: bool,
-    /// The offset that was left out: positions in the file are relative to it.
+    /// Offset that was left out. Positions in the file are relative to it.
     pub offset: Option<Offset>,
-    /// What values are rounded to, one phrase each; empty if they are exact.
+    /// Descriptions of how values are rounded, one phrase each; empty if values are exact.
     pub precision: Vec<String>,
-    /// How many values were out of the format's range and are at its end now.
+    /// Number of values that were out of the format's range. The file has the end of the range instead.
     pub limited: u64,
-    /// Which roundings are coarse against the sizes of Gaussians, one sentence each.
+    /// Descriptions of roundings that are coarse relative to the sizes of Gaussians, one sentence each.
     pub coarse: Vec<String>,
 }
 
 impl Lost {
-    /// What a file of `degree`, without extras, normals and marks, lacks of `splats`.
+    /// Returns what a file of `degree` without extras and normals lacks of `splats`. `antialiased` tells whether the file
+    /// keeps the mark of anti-aliasing.
     pub(crate) fn beside(splats: &Splats, degree: ShDegree, antialiased: bool) -> Self {
         Self {
             sh_degree: (degree < splats.degree).then(|| [splats.degree.get(), degree.get()]),
@@ -64,13 +66,13 @@ impl Lost {
     }
 }
 
-/// Writes `splats` in the format `kind`. Returns the number of bytes, and what they lack.
+/// Writes `splats` in the format `kind`. Returns the number of bytes, and what the file lacks of the scene.
 ///
-/// The bytes depend on the scene and the options alone.
+/// The bytes depend only on the scene and the options.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a kind that is none of [`Kind::WRITTEN`] (.lexi has its own writer), for options out of range, for
-/// a scene whose arrays differ in length, and for an empty one; [`Error::Limit`] for a scene too large for the
+/// [`Error::Parameter`] for a kind that is not in [`Kind::WRITTEN`] (.lexi has its own writer), for options out of range,
+/// for a scene whose arrays differ in length, and for an empty scene; [`Error::Limit`] for a scene too large for the
 /// format; [`Error::Cancelled`] if `progress` cancels; errors of the sink.
 pub fn write<'a>(
     kind: Kind,

@@ -1,4 +1,4 @@
-//! Scenes as NumPy arrays. What leaves is moved into arrays without a copy; what comes in is copied once.
+//! Scenes as NumPy arrays. Results are moved into arrays without a copy. Arguments are copied once.
 
 use lexisplat::sh::{CHANNELS, MAX_REST};
 use lexisplat::{
@@ -17,19 +17,19 @@ use crate::errors::parameter;
 use crate::invalid::finite;
 use crate::work::check_process;
 
-/// Gaussians whose SH one task turns from one order to the other.
+/// Number of Gaussians whose SH one task reorders.
 const PER_TASK: usize = 4096;
 
-/// How SH-rest leaves.
+/// The order of SH-rest in a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ShOrder {
-    /// A view with strides of the array with the channels apart.
+    /// A view with strides on the array with the channels apart.
     Strided,
-    /// Turned in place to (Gaussians, coefficients, channels).
+    /// An array that was reordered in place to (Gaussians, coefficients, channels).
     Contiguous,
 }
 
-/// `splats` as a dictionary of arrays by the names of Python's `Splats`.
+/// Returns `splats` as a dictionary of arrays. The keys are the names of Python's `Splats`.
 pub(crate) fn to_python(py: Python<'_>, splats: Splats, order: ShOrder) -> PyResult<Bound<'_, PyDict>> {
     let Splats { geometry, degree, mut sh_rest, meta } = splats;
     let (n, each) = (geometry.len(), degree.rest_per_channel());
@@ -62,7 +62,7 @@ pub(crate) fn to_python(py: Python<'_>, splats: Splats, order: ShOrder) -> PyRes
     Ok(out)
 }
 
-/// Turns rows of (channels, `each` coefficients) to rows of (coefficients, channels).
+/// Reorders rows of (channels, `each` coefficients) to rows of (coefficients, channels).
 fn turn(rows: &mut [f32], each: usize) {
     let length = CHANNELS * each;
     if length == 0 {
@@ -107,8 +107,8 @@ macro_rules! extras {
 }
 extras! { I8(i8) U8(u8) I16(i16) U16(u16) I32(i32) U32(u32) F32(f32) F64(f64) }
 
-/// The scene that the attributes of Python's `Splats` hold, with finite values. Gaussians with others are refused, or left out
-/// if `drop_invalid` says so, and `told` then says how many.
+/// Returns the scene in the attributes of Python's `Splats`, whose values must be finite. Gaussians with other values
+/// cause an error, or are left out if `drop_invalid` is set. In that case a message with their number is added to `told`.
 pub(crate) fn finite_from_python(
     splats: &Bound<'_, PyAny>,
     drop_invalid: bool,
@@ -119,7 +119,7 @@ pub(crate) fn finite_from_python(
     Ok(splats)
 }
 
-/// The scene that the attributes of Python's `Splats` hold, with whatever values.
+/// Returns the scene in the attributes of Python's `Splats`, with any values.
 pub(crate) fn from_python(splats: &Bound<'_, PyAny>) -> PyResult<Splats> {
     let py = splats.py();
     check_process()?;
@@ -166,14 +166,14 @@ pub(crate) fn from_python(splats: &Bound<'_, PyAny>) -> PyResult<Splats> {
     Ok(splats)
 }
 
-/// The offset, of which `None` and zeros are none.
+/// Returns the offset; `None` for `None` and for zeros.
 fn offset(splats: &Bound<'_, PyAny>) -> PyResult<Option<Offset>> {
     let numbers: Option<[f64; 3]> = splats.getattr("offset")?.extract()?;
     let found = numbers.map_or(Ok(None), Offset::new);
     found.map_err(|error| crate::errors::raise(splats.py(), &error.into()))
 }
 
-/// Infinite opacities as readers of files take them.
+/// Returns the finite value that readers of files use for an infinite opacity.
 fn sure(opacity: f32) -> f32 {
     if opacity.is_infinite() { SURE_OPACITY.copysign(opacity) } else { opacity }
 }
@@ -194,7 +194,7 @@ fn shape(py: Python<'_>, name: &'static str, found: &[usize], expected: &str) ->
     parameter(py, name, format!("{found:?}"), format!("an array of shape {expected}"))
 }
 
-/// The rows of an attribute that has `N` columns.
+/// Returns the rows of an attribute with `N` columns.
 fn rows<const N: usize>(splats: &Bound<'_, PyAny>, name: &'static str) -> PyResult<Vec<[f32; N]>> {
     let py = splats.py();
     let values = array::<PyReadonlyArray2<'_, f32>>(splats, name)?;
@@ -204,7 +204,7 @@ fn rows<const N: usize>(splats: &Bound<'_, PyAny>, name: &'static str) -> PyResu
     Ok(slice(py, name, values.as_slice())?.as_chunks().0.to_vec())
 }
 
-/// The degree, and SH-rest with the channels apart.
+/// Returns the SH degree, and SH-rest with the channels apart.
 fn sh_rest(splats: &Bound<'_, PyAny>, n: usize) -> PyResult<(ShDegree, Vec<f32>)> {
     let py = splats.py();
     let values = array::<PyReadonlyArray3<'_, f32>>(splats, "shN")?;
@@ -219,7 +219,7 @@ fn sh_rest(splats: &Bound<'_, PyAny>, n: usize) -> PyResult<(ShDegree, Vec<f32>)
     }
 }
 
-/// Copies an array of (Gaussians, coefficients, channels) to one of (Gaussians, channels, coefficients).
+/// Copies an array of (Gaussians, coefficients, channels) to an array of (Gaussians, channels, coefficients).
 fn channel_major(values: ArrayView3<'_, f32>) -> Vec<f32> {
     let turned = values.permuted_axes([0, 2, 1]);
     if let Some(all) = turned.as_slice() {
@@ -228,7 +228,7 @@ fn channel_major(values: ArrayView3<'_, f32>) -> Vec<f32> {
     transposed(turned)
 }
 
-/// The values of `from` in the order of its axes, whatever its strides are.
+/// Returns the values of `from` in the order of its axes, for any strides.
 fn transposed(from: ArrayView3<'_, f32>) -> Vec<f32> {
     let (n, each) = (from.shape()[0], from.shape()[1] * from.shape()[2]);
     let mut out = vec![0.0; n * each];
@@ -243,7 +243,7 @@ fn transposed(from: ArrayView3<'_, f32>) -> Vec<f32> {
     out
 }
 
-/// A contiguous copy of `values`, an array of three dimensions with any strides.
+/// Returns a contiguous copy of `values`, an array of three dimensions with any strides.
 #[pyfunction]
 pub(crate) fn contiguous<'py>(
     py: Python<'py>,
@@ -252,12 +252,12 @@ pub(crate) fn contiguous<'py>(
     check_process()?;
     let view = values.as_array();
     let shape = [view.shape()[0], view.shape()[1], view.shape()[2]];
-    // With the GIL held, so that no other thread of Python changes the array meanwhile.
+    // The GIL is held, so that no other thread of Python changes the array meanwhile.
     let copy = transposed(view);
     PyArray1::from_vec(py, copy).reshape(shape)
 }
 
-/// An array of one dimension of a copy of `values`.
+/// Returns a copy of `values` as an array of one dimension.
 pub(crate) fn vector<'py, T: Element + Copy>(py: Python<'py>, values: &[T]) -> Bound<'py, PyArray1<T>> {
     PyArray1::from_slice(py, values)
 }

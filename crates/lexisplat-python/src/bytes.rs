@@ -1,4 +1,4 @@
-//! Files that are read: mapped, or bytes that Python gave.
+//! Files that are read: mapped files, or bytes from Python.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,14 +10,14 @@ use pyo3::types::PyDict;
 
 use crate::errors::{Result, raise};
 
-/// The bytes of a file, shared.
+/// The bytes of a file. Clones share them.
 #[derive(Debug, Clone)]
 pub(crate) enum Bytes {
-    /// A file, mapped if that is possible.
+    /// A file, which is mapped if possible.
     File(Arc<Input>),
-    /// Bytes that Python holds.
+    /// Bytes that Python owns.
     Python(Arc<PyBackedBytes>),
-    /// Bytes that were made here.
+    /// Bytes that this module made.
     Own(Arc<Vec<u8>>),
 }
 
@@ -31,19 +31,19 @@ impl AsRef<[u8]> for Bytes {
     }
 }
 
-/// What Python calls a file: a path, or its bytes.
+/// A file as passed by Python: a path, or the bytes of the file.
 #[derive(FromPyObject)]
 pub(crate) enum Given {
-    /// The bytes.
+    /// The bytes of the file.
     #[pyo3(transparent)]
     Memory(PyBackedBytes),
-    /// The path.
+    /// The path of the file.
     #[pyo3(transparent)]
     Path(PathBuf),
 }
 
 impl Given {
-    /// The name in messages, where it is not given.
+    /// Returns the name of the file in messages.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Memory(_) => "bytes".to_owned(),
@@ -51,7 +51,7 @@ impl Given {
         }
     }
 
-    /// The bytes, of a file that is no larger than `limits` allow.
+    /// Returns the bytes. A file must not be larger than `limits` allow.
     pub(crate) fn bytes(self, limits: &Limits) -> Result<Bytes> {
         Ok(match self {
             Self::Memory(bytes) => Bytes::Python(Arc::new(bytes)),
@@ -60,7 +60,7 @@ impl Given {
     }
 }
 
-/// The limits that `given` says by name.
+/// Returns the limits in `given`, by name. The others have their defaults.
 pub(crate) fn limits(py: Python<'_>, given: Option<&Bound<'_, PyDict>>) -> PyResult<Limits> {
     let mut limits = Limits::default();
     for (name, value) in given.into_iter().flatten() {

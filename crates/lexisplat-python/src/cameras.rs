@@ -1,4 +1,4 @@
-//! Cameras as tuples of plain values, of which Python makes its `Camera`.
+//! Cameras as tuples of plain values, which Python converts to its `Camera`.
 
 use std::path::PathBuf;
 
@@ -10,13 +10,13 @@ use pyo3::prelude::*;
 use crate::draw::Subject;
 use crate::work::without_gil;
 
-/// Name, width, height, focal lengths, position in the world, rotation from camera to world, the near plane, and `train`,
-/// `test` or `None`.
+/// Name, width, height, focal lengths along x and y, position in the world, rotation from camera to world, distance of
+/// the near plane, and `train`, `test` or `None`.
 #[derive(Clone, FromPyObject, IntoPyObject)]
 pub(crate) struct CameraTuple(String, u32, u32, f32, f32, [f64; 3], [[f32; 3]; 3], f32, Option<String>);
 
 impl CameraTuple {
-    /// `camera`, which is at `position` in the world.
+    /// Returns `camera` as a tuple. Its position in the world is `position`.
     fn at(position: [f64; 3], camera: Camera) -> Self {
         let split = camera.split.map(|split| match split {
             Split::Train => "train".to_owned(),
@@ -26,7 +26,7 @@ impl CameraTuple {
         Self(name, width, height, fx, fy, position, rotation, near, split)
     }
 
-    /// The camera for a scene whose positions are relative to `offset`.
+    /// Returns the camera for a scene whose positions are relative to `offset`.
     fn camera(self, offset: Option<Offset>) -> Camera {
         let Self(name, width, height, fx, fy, position, rotation, near, split) = self;
         let numbers = Offset::numbers(offset);
@@ -41,12 +41,12 @@ impl CameraTuple {
     }
 }
 
-/// What the library draws a scene with whose positions are relative to `offset`.
+/// Returns the cameras for a scene whose positions are relative to `offset`.
 pub(crate) fn cameras(given: Vec<CameraTuple>, offset: Option<Offset>) -> Vec<Camera> {
     given.into_iter().map(|camera| camera.camera(offset)).collect()
 }
 
-/// Cameras of a scene whose positions are relative to `offset`, in the world.
+/// Returns cameras of a scene whose positions are relative to `offset` as tuples, with positions in the world.
 fn tuples(cameras: Vec<Camera>, offset: Option<Offset>) -> Vec<CameraTuple> {
     let numbers = Offset::numbers(offset);
     let of = |camera: Camera| {
@@ -55,7 +55,7 @@ fn tuples(cameras: Vec<Camera>, offset: Option<Offset>) -> Vec<CameraTuple> {
     cameras.into_iter().map(of).collect()
 }
 
-/// Reads cameras of any kind. Returns them and warnings.
+/// Reads cameras of any format. Returns the cameras and warnings.
 #[pyfunction]
 pub(crate) fn read_cameras(py: Python<'_>, path: PathBuf) -> PyResult<(Vec<CameraTuple>, Vec<String>)> {
     let set = without_gil(py, None, move |_| Ok(read_views(path, &mut |_| None)?))?;
@@ -63,7 +63,7 @@ pub(crate) fn read_cameras(py: Python<'_>, path: PathBuf) -> PyResult<(Vec<Camer
     Ok((placed.map(|(position, camera)| CameraTuple::at(position, camera)).collect(), set.warnings))
 }
 
-/// Cameras on a circle around the scene.
+/// Returns cameras on a circle around the scene.
 #[pyfunction]
 pub(crate) fn orbit(
     scene: &Bound<'_, PyAny>,
@@ -79,7 +79,8 @@ pub(crate) fn orbit(
     })
 }
 
-/// Views of the scene that are like photographs, as those that judge what is compressed without cameras.
+/// Returns views of the scene that are like photographs. Views of this kind judge scenes that are compressed without
+/// cameras.
 #[pyfunction]
 #[pyo3(signature = (scene, count, *, progress))]
 pub(crate) fn photographs(

@@ -25,7 +25,7 @@ use crate::files::{json, read_options, with_source};
 use crate::scene::Scene;
 use crate::work::{Watch, without_gil};
 
-/// The choices, as Python names them. What is `None` is as the library's default.
+/// The choices with their names in Python. `None` means the library's default.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Choices {
@@ -42,7 +42,7 @@ pub(crate) struct Choices {
     sample: Option<usize>,
     seed: u64,
     cameras: Option<Vec<CameraTuple>>,
-    /// The scene's file, if cameras that lie beside it are used.
+    /// File of the scene, if cameras that lie beside it should be used.
     beside: Option<PathBuf>,
     views: Option<String>,
     keep_order: bool,
@@ -53,19 +53,19 @@ pub(crate) struct Choices {
     device: String,
 }
 
-/// What messages call a file that was made here.
+/// Name in messages of a file that was made here.
 const MADE: &str = "scene.lexi";
 
-/// A name and whether the choice of that name was made.
+/// The name of a choice, and whether the choice was made.
 type Named = (&'static str, bool);
 
-/// The name of the first choice that was made.
+/// Returns the name of the first choice that was made.
 fn made(choices: &[Named]) -> Option<&'static str> {
     choices.iter().find(|choice| choice.1).map(|choice| choice.0)
 }
 
 impl Choices {
-    /// Choices that only layouts with exact geometry have.
+    /// Returns the choices that only layouts with exact geometry have.
     fn exact_only(&self, has_dictionary: bool) -> [Named; 4] {
         [
             ("max_nonzeros", self.max_nonzeros.is_some()),
@@ -75,7 +75,7 @@ impl Choices {
         ]
     }
 
-    /// The targets, of which at most one is chosen.
+    /// Returns the targets. At most one may be chosen.
     fn goals(&self) -> [Named; 5] {
         [
             ("preset", self.preset.is_some()),
@@ -86,7 +86,7 @@ impl Choices {
         ]
     }
 
-    /// Choices other than targets that only packed files have.
+    /// Returns the choices that only packed files have, without the targets.
     fn packed_only(&self) -> [Named; 6] {
         [
             ("guess", self.guess),
@@ -98,7 +98,7 @@ impl Choices {
         ]
     }
 
-    /// Refuses choices that do not go together.
+    /// Returns an error for choices that do not go together.
     fn check(&self, has_dictionary: bool) -> Result<()> {
         let refuse = |a: &[Named], b: &[Named]| match (made(a), made(b)) {
             (Some(a), Some(b)) => Err(Error::parameter(b, "given", format!("not together with {a}"))),
@@ -114,14 +114,14 @@ impl Choices {
         refuse(&[("dictionary", has_dictionary)], &[("atoms", self.atoms.is_some())])
     }
 
-    /// The layout that is chosen, or the one that the other choices need, as in the program.
+    /// Returns the chosen layout, or else the layout that the other choices need, as in the program.
     fn chosen_layout(&self, has_dictionary: bool) -> Result<Layout> {
         let packed = made(&self.goals()).or(made(&self.packed_only()));
         let asked = self.layout.as_deref().map(str::parse).transpose()?;
         choose_layout(asked, self.tol.is_some(), made(&self.exact_only(has_dictionary)), packed)
     }
 
-    /// The library's compression of these choices.
+    /// Returns the library's compression for these choices.
     fn compression(self, device: Device, dictionary: Option<Dictionary>) -> Result<Compression> {
         self.check(dictionary.is_some())?;
         let layout = self.chosen_layout(dictionary.is_some())?;
@@ -163,7 +163,7 @@ impl Choices {
     }
 }
 
-/// Where generated views are taken from, by name.
+/// Returns the viewpoints of generated views by their name.
 fn views(name: &str) -> Result<Viewpoints> {
     name.parse().map_err(|error| match error {
         Error::Parameter { value, expected, .. } => Error::parameter("views", value, expected),
@@ -171,7 +171,7 @@ fn views(name: &str) -> Result<Viewpoints> {
     })
 }
 
-/// The options that packed files have, however they are packed.
+/// Returns the options of the codec that all packed files have.
 pub(crate) fn pack_options(
     tol: Option<f64>,
     atoms: Option<usize>,
@@ -187,12 +187,12 @@ pub(crate) fn pack_options(
         .with_seed(seed)
 }
 
-/// The preset of this name, or the default one.
+/// Returns the preset of this name; `None` gives the default preset.
 pub(crate) fn preset(name: Option<&str>) -> Result<Preset> {
     Ok(name.map_or(Ok(Preset::default()), str::parse)?)
 }
 
-/// A dictionary: an array of (atoms, coefficients), a file, or its bytes.
+/// Returns a dictionary from an array of (atoms, coefficients), from a file, or from the bytes of a file.
 fn dictionary_of(given: &Bound<'_, PyAny>) -> PyResult<Option<Dictionary>> {
     let py = given.py();
     let fail = |error: lexisplat::Error| raise(py, &error.into());
@@ -219,13 +219,14 @@ fn dictionary_of(given: &Bound<'_, PyAny>) -> PyResult<Option<Dictionary>> {
     Dictionary::new(degree, atoms).map(Some).map_err(fail)
 }
 
-/// What is compressed.
+/// The scene to compress.
 enum Source {
     Splats(Box<Splats>),
     File(Given),
 }
 
-/// Compresses arrays or a file by `choices`. The result is in memory. Returns it, and what was left out of arrays.
+/// Compresses arrays or a file by `choices`, in memory. Returns the compressed scene, and messages about Gaussians that
+/// were left out of arrays.
 #[pyfunction]
 #[pyo3(signature = (source, choices, *, dictionary, drop_invalid, drop_extras, limit, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -274,7 +275,8 @@ pub(crate) fn compress(
     Ok((scene, told))
 }
 
-/// Compresses `source`. The cameras `views`, which `compression` has too, and those beside the scene are in the world.
+/// Compresses `source`. The cameras `views`, which are also those of `compression`, and the cameras beside the scene are
+/// in the world.
 fn run(
     compression: &Compression,
     views: Option<Vec<CameraTuple>>,

@@ -1,4 +1,4 @@
-//! Decodes a file part after part, on a thread of its own that is one part ahead.
+//! Decodes a file part by part, on a thread of its own that is one part ahead.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,13 +13,13 @@ use crate::errors::{Result, raise};
 use crate::scene::Held;
 use crate::work::POLL;
 
-/// Parts that wait to be taken, at most. With the one that is decoded they bound the memory.
+/// Largest number of decoded parts that wait to be taken. With the part being decoded they bound the memory.
 const WAITING: usize = 1;
 
-/// The first Gaussian's number, and the part.
+/// The number of the first Gaussian, and the part.
 type Part = Result<(usize, Splats)>;
 
-/// An iterator of parts: the number of the first Gaussian, and arrays.
+/// An iterator over parts: the number of the first Gaussian, and arrays.
 #[pyclass(frozen, module = "lexisplat._native")]
 #[derive(Debug)]
 pub(crate) struct Chunks(Mutex<Receiver<Part>>);
@@ -30,13 +30,13 @@ impl Chunks {
         thread::spawn(move || {
             let decoded = held.reader().and_then(|reader| {
                 reader.each(&mut |start, model| {
-                    // Nobody waits once the iterator is gone.
+                    // After the iterator is dropped, there is no receiver.
                     sender.send(Ok((start, model.into_splats()))).map_err(|_| Error::Cancelled)
                 })?;
                 Ok(())
             });
             if let Err(error) = decoded {
-                // As above.
+                // After the iterator is dropped, there is no receiver.
                 let _ = sender.send(Err(error));
             }
         });

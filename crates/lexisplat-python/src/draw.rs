@@ -1,4 +1,4 @@
-//! Pictures of scenes, and comparisons of two.
+//! Draws pictures of scenes, and compares two scenes.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use crate::files::json;
 use crate::scene::{Held, Scene};
 use crate::work::without_gil;
 
-/// A scene that Python gave, which may still have to be decoded.
+/// A scene from Python, which may not be decoded yet.
 pub(crate) enum Subject {
     Dense(Box<Splats>),
     Held(Arc<Held>),
@@ -30,12 +30,14 @@ pub(crate) enum Resolved {
 }
 
 impl Subject {
-    /// The scene that `given` is: a compressed one, or one with the attributes of `Splats`, all of them finite.
+    /// Returns the scene in `given`: a compressed scene, or an object with the attributes of `Splats`, all of them
+    /// finite.
     pub(crate) fn of(given: &Bound<'_, PyAny>) -> PyResult<Self> {
         Self::dropping(given, false, &mut Vec::new())
     }
 
-    /// The same, without Gaussians that hold other values if `drop_invalid` says so; `told` then says how many.
+    /// Returns the scene in `given`, like [`Self::of`]. If `drop_invalid` is set, Gaussians with other values are left
+    /// out, and a message with their number is added to `told`.
     fn dropping(given: &Bound<'_, PyAny>, drop_invalid: bool, told: &mut Vec<String>) -> PyResult<Self> {
         match given.cast::<Scene>() {
             Ok(scene) => Ok(Self::Held(Arc::clone(&scene.get().held))),
@@ -59,12 +61,12 @@ impl Resolved {
         }
     }
 
-    /// What positions are relative to.
+    /// Returns the offset to which positions are relative.
     pub(crate) fn offset(&self) -> Option<Offset> {
         self.scene().meta().offset
     }
 
-    /// Makes positions relative to `offset`.
+    /// Makes positions relative to `offset`. The scene stays in place.
     fn rebase(&mut self, offset: Option<Offset>) {
         if self.offset() == offset {
             return;
@@ -75,7 +77,7 @@ impl Resolved {
         }
     }
 
-    /// The scene with dense SH.
+    /// Returns the scene with dense SH.
     pub(crate) fn dense(&self) -> Cow<'_, Splats> {
         match self {
             Self::Dense(splats) => Cow::Borrowed(splats),
@@ -84,15 +86,15 @@ impl Resolved {
     }
 }
 
-/// The device that `text` names.
+/// Returns the device named by `text`.
 pub(crate) fn device(py: Python<'_>, text: &str) -> PyResult<Device> {
     text.parse().map_err(|error: lexisplat_render::Error| raise(py, &error.into()))
 }
 
-/// Arrays of (height, width, 3).
+/// Pictures as arrays of (height, width, 3).
 type Pictures<'py> = Vec<Bound<'py, PyArray3<f32>>>;
 
-/// Draws the scene as each camera sees it: arrays of (height, width, 3), and warnings.
+/// Draws the scene from each camera. Returns arrays of (height, width, 3), and warnings.
 #[pyfunction]
 #[pyo3(signature = (scene, views, *, background, max_degree, device_name, drop_invalid, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -124,8 +126,8 @@ fn picture(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
     PyArray1::from_vec(py, image.pixels.into_flattened()).reshape(shape)
 }
 
-/// Scores scene `b` against `a` view by view, as JSON. Without views some like photographs are looked for. Returns warnings
-/// too.
+/// Scores scene `b` against `a` view by view. Returns the scores as JSON, and warnings. Without views a search finds
+/// views like photographs.
 #[pyfunction]
 #[pyo3(signature = (a, b, views, *, count, background, eight_bit, device_name, drop_invalid, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]

@@ -1,4 +1,4 @@
-//! Errors of the library as the exceptions of `lexisplat._errors`.
+//! Converts errors of the library to the exceptions of `lexisplat._errors`.
 
 use std::io;
 
@@ -8,10 +8,10 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyModule;
 
-/// Result of the crates that the package calls.
+/// Result of the crates that this package calls.
 pub(crate) type Result<T> = lexisplat_compress::Result<T>;
 
-/// What the system calls its errors, where the library does not know the number (POSIX `errno.h`).
+/// Numbers of errors of the operating system (POSIX `errno.h`), for errors whose number the library does not know.
 const NOT_FOUND: i32 = 2;
 const INPUT_OUTPUT: i32 = 5;
 const PERMISSION_DENIED: i32 = 13;
@@ -19,12 +19,12 @@ const ALREADY_EXISTS: i32 = 17;
 const IS_A_FOLDER: i32 = 21;
 const NO_SPACE: i32 = 28;
 
-/// The exception that `error` is in Python.
+/// Returns the Python exception for `error`.
 pub(crate) fn raise(py: Python<'_>, error: &Error) -> PyErr {
     make(py, error).unwrap_or_else(|broken| broken)
 }
 
-/// An error about an argument.
+/// Returns an exception about an argument.
 pub(crate) fn parameter(
     py: Python<'_>,
     name: &'static str,
@@ -81,7 +81,7 @@ fn os_error(py: Python<'_>, source: &io::Error, file: &str) -> PyResult<PyErr> {
         _ => INPUT_OUTPUT,
     });
     let text = source.to_string();
-    // The standard library adds the number to the text, and so does Python.
+    // The standard library appends the number to the text, and so does Python.
     let text = text.strip_suffix(&format!(" (os error {number})")).unwrap_or(&text);
     Ok(PyErr::from_value(module(py)?.getattr("os_error")?.call1((number, text, file))?))
 }

@@ -17,7 +17,7 @@ use crate::bytes::{Given, limits};
 use crate::errors::{Result, parameter, raise};
 use crate::work::without_gil;
 
-/// Reads the scene in a file or in bytes. Returns its arrays and its warnings.
+/// Reads the scene in a file or in bytes. Returns its arrays and warnings.
 #[pyfunction]
 #[pyo3(signature = (source, *, name, contiguous, drop_invalid, drop_extras, limit))]
 pub(crate) fn load<'py>(
@@ -48,7 +48,7 @@ pub(crate) fn load<'py>(
     Ok((to_python(py, splats, order)?, warnings))
 }
 
-/// How scenes are read.
+/// Returns the options of reading scenes.
 pub(crate) fn read_options(
     py: Python<'_>,
     drop_invalid: bool,
@@ -61,8 +61,8 @@ pub(crate) fn read_options(
         .with_limits(limits(py, limit)?))
 }
 
-/// Opens the scene `given`, which messages call `name`, and does `work` with it. It is read as a whole if `whole` says so of its bytes.
-/// A compressed scene is refused.
+/// Opens the scene `given`, which messages call `name`, and calls `work` with it. The scene is read as a whole if `whole`
+/// returns true for its bytes. Returns an error for a compressed scene.
 pub(crate) fn with_source<T>(
     given: Given,
     name: &str,
@@ -84,8 +84,8 @@ pub(crate) fn with_source<T>(
     }
 }
 
-/// Writes a scene in the format that `format` or the extension of `path` names. Returns what the file lacks, as JSON, and
-/// warnings.
+/// Writes a scene in the format `format`, or else in the format of the extension of `path`. Returns what the file lacks,
+/// as JSON, and warnings.
 #[pyfunction]
 #[pyo3(signature = (path, splats, *, format, spz_version, sh_bits, sog_palette, glb_spz, drop_invalid, overwrite, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -132,17 +132,17 @@ pub(crate) fn save(
     Ok((json(py, &Told { lost, removed })?, told))
 }
 
-/// What is told of a written file.
+/// The facts about a written file.
 #[derive(Serialize)]
 struct Told {
     #[serde(flatten)]
     lost: Lost,
-    /// Gaussians that a packed file leaves out.
+    /// Number of Gaussians that a packed file leaves out.
     #[serde(skip_serializing_if = "Option::is_none")]
     removed: Option<u64>,
 }
 
-/// What a packed file lacks of `splats`, beside Gaussians.
+/// Returns what a packed file lacks of `splats`, apart from Gaussians.
 fn lost_in_packed(splats: &Splats) -> Lost {
     let mut lost = Lost::default();
     lost.normals = !splats.geometry.normals.is_empty();
@@ -151,12 +151,12 @@ fn lost_in_packed(splats: &Splats) -> Lost {
     lost
 }
 
-/// Where a file is written that appears when it is whole.
+/// Returns the output at `path`. The file appears when it is whole.
 pub(crate) fn output(path: &std::path::Path, overwrite: bool) -> Output<'_> {
     Output::new(path, if overwrite { Existing::Replace } else { Existing::Refuse })
 }
 
-/// `value` as JSON, which Python reads.
+/// Returns `value` as JSON for Python.
 pub(crate) fn json(py: Python<'_>, value: &impl Serialize) -> PyResult<String> {
     serde_json::to_string(value)
         .map_err(|error| raise(py, &Error::parameter("report", error, "a report that can be told as JSON")))

@@ -1,4 +1,5 @@
-//! NaN and infinite values in scenes that Python gave: they are refused by name, or their Gaussians are left out.
+//! NaN and infinite values in scenes from Python. They cause an error that names the array, or their Gaussians are left
+//! out.
 
 use lexisplat::Splats;
 use pyo3::prelude::*;
@@ -6,10 +7,10 @@ use rayon::prelude::*;
 
 use crate::errors::parameter;
 
-/// Values that one task looks at.
+/// Number of values that one task examines.
 const PER_TASK: usize = 1 << 16;
 
-/// `splats`, whose values are all finite, and what is to be told of those that were left out.
+/// Returns `splats` without Gaussians whose values are not finite, and a message about them.
 ///
 /// Extra properties may have any values, as in files.
 pub(crate) fn finite(
@@ -42,7 +43,7 @@ pub(crate) fn finite(
     Ok((splats, Some(told)))
 }
 
-/// The arrays by their names in Python, with the number of values of a Gaussian.
+/// Returns the arrays with their names in Python and the number of values of a Gaussian.
 fn arrays(splats: &Splats) -> [(&'static str, usize, &[f32]); 7] {
     let g = &splats.geometry;
     [
@@ -57,11 +58,11 @@ fn arrays(splats: &Splats) -> [(&'static str, usize, &[f32]); 7] {
 }
 
 fn all_finite(values: &[f32]) -> bool {
-    // Without a way out the inner loop is vectorised.
+    // The inner loop has no early exit, so that it is vectorised.
     values.par_chunks(PER_TASK).all(|values| values.iter().fold(true, |good, v| good & v.is_finite()))
 }
 
-/// For each Gaussian whether all its values are finite.
+/// Returns for each Gaussian whether all its values are finite.
 fn keep(splats: &Splats) -> Vec<bool> {
     let mut keep = vec![true; splats.len()];
     for (_, each, values) in arrays(splats) {
@@ -72,7 +73,7 @@ fn keep(splats: &Splats) -> Vec<bool> {
     keep
 }
 
-/// The first value of Gaussian `i` that is not finite, and its array.
+/// Returns the first value of Gaussian `i` that is not finite, and the name of its array.
 fn bad_value(splats: &Splats, i: usize) -> (&'static str, f32) {
     let found = arrays(splats).into_iter().find_map(|(name, each, values)| {
         let own = values.get(i * each..(i + 1) * each)?;

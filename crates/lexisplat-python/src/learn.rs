@@ -1,4 +1,4 @@
-//! Dictionaries of rows of any length.
+//! Learns dictionaries of rows of any length, and codes rows over them.
 
 use lexisplat::learn::{DEFAULT_MOMENTUM, LearnOptions, Statistics as Sums, learn_atoms};
 use lexisplat::pursuit::{Coder, RowCodes, RowValue, StopRule, ValueType, encode_rows as encode_all};
@@ -10,8 +10,8 @@ use pyo3::types::PyBytes;
 use crate::errors::{Result, parameter, raise};
 use crate::work::without_gil;
 
-/// Row starts, atoms, values of the type of the rows, the error of each row, and the numbers of rows that are not within the
-/// tolerance.
+/// Row starts, atoms, values in the type of the rows, the error of each row, and the numbers of rows that are not within
+/// the tolerance.
 type Codes<'py> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<i32>>,
@@ -20,7 +20,7 @@ type Codes<'py> = (
     Bound<'py, PyArray1<i64>>,
 );
 
-/// How rows are coded, as Python names it: `tol`, `max_nonzeros`, `pursuit`.
+/// The rule for coding rows, in Python's terms: `tol`, `max_nonzeros`, `pursuit`.
 #[derive(FromPyObject)]
 pub(crate) struct Rule(Option<f64>, Option<usize>, String);
 
@@ -47,7 +47,7 @@ pub(crate) enum Rows<'py> {
     Double(PyReadonlyArray2<'py, f64>),
 }
 
-/// Does `$work` with the rows of `$given`, which are called `$rows` there, of whichever type they are.
+/// Evaluates `$work` with the rows of `$given`, which are called `$rows` in it, for either type of rows.
 macro_rules! for_rows {
     ($given:expr, $rows:ident => $work:expr) => {
         match $given {
@@ -57,7 +57,8 @@ macro_rules! for_rows {
     };
 }
 
-/// A copy of the values of `rows`, and the length of a row. Other threads may change an array while the GIL is not held.
+/// Returns the length of a row and a copy of the values of `rows`. A copy is needed because other threads may change an
+/// array while the GIL is not held.
 fn copied<T: Element + Copy>(rows: &PyReadonlyArray2<'_, T>) -> (usize, Vec<T>) {
     let dim = rows.shape()[1];
     let values = match rows.as_slice() {
@@ -76,7 +77,8 @@ fn to_array<'py>(py: Python<'py>, atoms: &Atoms) -> PyResult<Bound<'py, PyArray2
     PyArray1::from_slice(py, atoms.as_slice()).reshape([atoms.len(), atoms.dim()])
 }
 
-/// Learns atoms. Returns them, the rounds, the rows learned from, and the mean nonzeros of rows that were held out.
+/// Learns atoms. Returns the atoms, the number of rounds, the number of rows learned from, and the mean number of
+/// nonzeros of held-out rows.
 #[pyfunction]
 #[pyo3(signature = (rows, *, atoms, rule, seed, sample, progress))]
 pub(crate) fn learn_rows<'py>(
@@ -103,7 +105,7 @@ pub(crate) fn learn_rows<'py>(
     Ok((to_array(py, &learned.atoms)?, learned.rounds, learned.sample, learned.held_out_nonzeros))
 }
 
-/// Codes rows over atoms, as arrays of a CSR matrix.
+/// Codes rows over atoms. Returns the arrays of a CSR matrix.
 #[pyfunction]
 #[pyo3(signature = (components, rows, *, rule, progress))]
 pub(crate) fn encode_rows<'py>(
@@ -151,7 +153,7 @@ pub(crate) struct Statistics(Sums);
 
 #[pymethods]
 impl Statistics {
-    /// Codes rows and sums what learning needs of them.
+    /// Codes rows and sums the statistics that learning needs.
     #[staticmethod]
     #[pyo3(signature = (components, rows, *, rule, progress))]
     fn of<'py>(
@@ -169,19 +171,19 @@ impl Statistics {
         })
     }
 
-    /// The sums of both.
+    /// Returns the sums of both.
     fn plus(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
         let mut sum = self.0.clone();
         sum.add(&other.0).map_err(|error| raise(py, &error.into()))?;
         Ok(Self(sum))
     }
 
-    /// All sums times a factor from 0 to 1.
+    /// Returns all sums times a factor from 0 to 1.
     fn scaled(&self, py: Python<'_>, factor: f64) -> PyResult<Self> {
         self.0.clone().scaled(factor).map(Self).map_err(|error| raise(py, &error.into()))
     }
 
-    /// Atoms that fit the sums better than `components`.
+    /// Returns atoms that fit the sums better than `components`.
     fn update<'py>(
         &self,
         py: Python<'py>,

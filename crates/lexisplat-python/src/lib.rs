@@ -1,8 +1,9 @@
-//! The native part of the Python package lexisplat: arrays in, arrays out.
+//! The native part of the Python package `lexisplat`. It takes and returns NumPy arrays.
 //!
-//! Everything here is private to the package. Its Python modules check and document arguments, and turn what comes from
-//! here into the classes that users see. Long work runs on a thread of its own without the GIL (`work`), so that
-//! Ctrl-C and progress reports reach Python.
+//! Everything here is private to the package. The Python modules of the package check and document the arguments, and turn the
+//! results of this module into the classes that users see. Start reading at `scene`, which holds a compressed scene, and `arrays`,
+//! which converts arrays. Long work runs on a thread of its own without the GIL (`work`), so that Ctrl-C and progress reports
+//! reach Python.
 
 mod arrays;
 mod bytes;

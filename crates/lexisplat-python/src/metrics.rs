@@ -13,10 +13,10 @@ use crate::bytes::Given;
 use crate::errors::parameter;
 use crate::work::without_gil;
 
-/// Scores by name, and of each picture the least and largest value if one is outside of 0..1.
+/// Scores by name, and for each picture its smallest and largest value if one of them is outside of 0..1.
 type Scores = (BTreeMap<&'static str, f64>, [Option<[f32; 2]>; 2]);
 
-/// Scores picture `b` against `a`, both arrays of (height, width, 3). PSNR is missing if they are identical.
+/// Scores picture `b` against `a`, both arrays of (height, width, 3). PSNR is missing if the pictures are identical.
 #[pyfunction]
 #[pyo3(signature = (a, b, *, flip, lpips))]
 pub(crate) fn score(

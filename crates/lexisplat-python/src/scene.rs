@@ -1,4 +1,4 @@
-//! A .lexi file that is held as it is, and decoded when that is needed.
+//! A .lexi file whose bytes are held in memory. It is decoded when a decoded form is needed.
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use crate::errors::{Result, raise};
 use crate::files::{json, output};
 use crate::work::{check_process, without_gil};
 
-/// The bytes of a .lexi file, and its reader and its model once something needed them.
+/// The bytes of a .lexi file, and its reader and its model once they were needed.
 #[derive(Debug)]
 pub(crate) struct Held {
     name: String,
@@ -30,7 +30,7 @@ pub(crate) struct Held {
 }
 
 impl Held {
-    /// The reader, which is kept: opening it decodes the dictionary and the tables.
+    /// Returns the reader. It is kept, because opening it decodes the dictionary and the tables.
     pub(crate) fn reader(&self) -> Result<&LexiReader<'static>> {
         if let Some(reader) = self.reader.get() {
             return Ok(reader);
@@ -39,7 +39,7 @@ impl Held {
         Ok(self.reader.get_or_init(|| reader))
     }
 
-    /// The decoded file, which is kept.
+    /// Returns the decoded file, which is kept.
     pub(crate) fn model(&self) -> Result<Arc<Model>> {
         let mut kept = self.model.lock().unwrap_or_else(PoisonError::into_inner);
         match &*kept {
@@ -57,7 +57,7 @@ impl Held {
 #[derive(Debug)]
 pub(crate) struct Scene {
     pub(crate) held: Arc<Held>,
-    /// The report of the compression, if it was made here, as JSON.
+    /// Report of the compression as JSON, if the scene was compressed here.
     report: Option<String>,
 }
 
@@ -72,8 +72,8 @@ impl Scene {
     }
 }
 
-/// Opens a .lexi file, or its bytes. Its header is checked, and nothing is decoded. `report` is that of its compression, if
-/// it was made by this package.
+/// Opens a .lexi file, or its bytes. The header is checked, and nothing is decoded. `report` is the report of the
+/// compression, if this package made the file.
 #[pyfunction]
 #[pyo3(signature = (source, *, name, report, limit))]
 pub(crate) fn open_scene(
@@ -98,18 +98,18 @@ impl Scene {
         Ok(self.reader(py)?.len())
     }
 
-    /// What messages call the file.
+    /// Returns the name of the file in messages.
     #[getter]
     fn name(&self) -> &str {
         &self.held.name
     }
 
-    /// Whether both files have the same bytes.
+    /// Returns whether both files have the same bytes.
     fn equals(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.held, &other.held) || self.held.bytes.as_ref() == other.held.bytes.as_ref()
     }
 
-    /// A hash of the bytes.
+    /// Returns a hash of the bytes.
     fn hash(&self, py: Python<'_>) -> u64 {
         py.detach(|| {
             let mut hasher = DefaultHasher::new();
@@ -118,7 +118,7 @@ impl Scene {
         })
     }
 
-    /// Size of the file in bytes.
+    /// Returns the size of the file, in bytes.
     #[getter]
     fn nbytes(&self) -> usize {
         self.held.bytes.as_ref().len()
@@ -134,25 +134,25 @@ impl Scene {
         Ok(self.reader(py)?.layout().name())
     }
 
-    /// What positions are relative to.
+    /// Returns the offset to which positions are relative.
     #[getter]
     fn offset(&self, py: Python<'_>) -> PyResult<Option<[f64; 3]>> {
         Ok(self.reader(py)?.meta().offset.map(lexisplat::Offset::get))
     }
 
-    /// The report of the compression as JSON, or `None` of a file that was opened.
+    /// Returns the report of the compression as JSON; `None` for a file that was opened.
     #[getter]
     fn report_json(&self) -> Option<&str> {
         self.report.as_deref()
     }
 
-    /// The atoms: an array of (atoms, coefficients).
+    /// Returns the atoms as an array of (atoms, coefficients).
     fn dictionary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let dictionary = self.reader(py)?.dictionary();
         PyArray1::from_slice(py, dictionary.as_slice()).reshape([dictionary.len(), dictionary.dim()])
     }
 
-    /// Facts about the file, all of which is decoded for them, as JSON.
+    /// Returns facts about the file as JSON. The whole file is decoded for them.
     fn info_json(&self, py: Python<'_>) -> PyResult<String> {
         let held = &self.held;
         let facts = without_gil(py, None, |_| {
@@ -188,14 +188,14 @@ impl Scene {
         json(py, &facts)
     }
 
-    /// The dense scene as arrays.
+    /// Returns the dense scene as arrays.
     fn decode<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let held = &self.held;
         let splats = without_gil(py, None, |_| Ok(held.reader()?.model()?.into_splats()))?;
         to_python(py, splats, ShOrder::Strided)
     }
 
-    /// The sparse codes: starts, atoms, values, numbers of Gaussians that are stored exactly, and their rows.
+    /// Returns the sparse codes: row starts, atoms, values, numbers of Gaussians that are stored exactly, and their rows.
     #[expect(clippy::type_complexity, reason = "five arrays")]
     fn codes<'py>(
         &self,
@@ -236,13 +236,13 @@ impl Scene {
         ))
     }
 
-    /// Decodes part after part.
+    /// Returns an iterator that decodes the file part by part.
     fn chunks(&self) -> PyResult<Chunks> {
         check_process()?;
         Ok(Chunks::start(Arc::clone(&self.held)))
     }
 
-    /// Writes the file. It appears when it is whole.
+    /// Writes the file, which appears when it is whole.
     #[pyo3(signature = (path, *, overwrite))]
     fn save(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> PyResult<()> {
         let held = &self.held;
@@ -253,7 +253,7 @@ impl Scene {
         })
     }
 
-    /// A copy of the file's bytes.
+    /// Returns a copy of the file's bytes.
     fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         PyBytes::new(py, self.held.bytes.as_ref())
     }

@@ -1,4 +1,5 @@
-//! The steps of packing a scene in tiles, each on bytes of the one before. `lexisplat.ray` runs them in tasks.
+//! The steps of packing a scene in tiles. Each step works on the bytes that the step before returned. `lexisplat.ray`
+//! runs them in tasks.
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +35,7 @@ enum Content {
     Splats(Box<Splats>),
 }
 
-/// The same from Python: its name in messages, and a path or arrays.
+/// A tile from Python: its name in messages, and a path or arrays.
 type Named<'py> = (String, Bound<'py, PyAny>);
 
 impl Tile {
@@ -46,7 +47,7 @@ impl Tile {
         Ok(Self { name, content })
     }
 
-    /// Does `work` with it. Errors name it.
+    /// Calls `work` with the tile. Errors name the tile.
     fn with<T>(
         &self,
         options: &ReadOptions,
@@ -54,7 +55,7 @@ impl Tile {
     ) -> Result<T> {
         let done = match &self.content {
             Content::Splats(splats) => work(&**splats),
-            // It is mapped while it is read, so that not all tiles of a bucket are at once.
+            // The file is mapped only while it is read, so that not all tiles of a bucket are mapped at once.
             Content::File(path) => {
                 with_source(Given::Path(path.clone()), &self.name, options, |_| false, &Silent, work)
             }
@@ -68,7 +69,7 @@ impl Tile {
     }
 }
 
-/// How tiles are read, and what is done with them, as Python names it.
+/// Options of reading and packing tiles, with their names in Python.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct Choices {
@@ -97,7 +98,7 @@ impl Choices {
         preset(self.preset.as_deref())
     }
 
-    /// What draws, unless it is guessed.
+    /// Returns the renderer; `None` if the sensitivity is guessed.
     fn renderer(&self, device: Device) -> Result<Option<Renderer>> {
         Ok(match self.guess {
             true => None,
@@ -106,17 +107,17 @@ impl Choices {
     }
 }
 
-/// Runs of rows: the first of each, and the one after its last.
+/// Runs of rows: the first row of each, and the row after its last.
 type Runs = Vec<(usize, usize)>;
 
-/// Of a bucket: tiles by number, with their rows; or pieces that were scattered.
+/// The input of a bucket: numbers of tiles, with the tiles and their rows; or pieces that were scattered.
 #[derive(FromPyObject)]
 pub(crate) enum Pieces<'py> {
     Rows(Vec<(usize, Named<'py>, Runs)>),
     Scattered(Vec<PyBackedBytes>),
 }
 
-/// What a bucket is read from.
+/// The source from which a bucket is read.
 enum From {
     Rows(Vec<(usize, Tile, Runs)>),
     Scattered(Vec<PyBackedBytes>),
@@ -152,17 +153,17 @@ impl From {
     }
 }
 
-/// Bytes for Python.
+/// Returns bytes for Python.
 fn made(py: Python<'_>, bytes: Vec<u8>) -> Py<PyBytes> {
     PyBytes::new(py, &bytes).unbind()
 }
 
-/// Reads all of `messages`.
+/// Reads all `messages`.
 fn all<T>(messages: &[PyBackedBytes], read: impl Fn(&[u8]) -> lexisplat::Result<T>) -> Result<Vec<T>> {
     Ok(messages.iter().map(|message| read(message)).collect::<lexisplat::Result<_>>()?)
 }
 
-/// Number of Gaussians of a tile, and its warnings.
+/// Returns the number of Gaussians of a tile, and its warnings.
 #[pyfunction]
 #[pyo3(signature = (tile, choices, limit))]
 pub(crate) fn tile_open(
@@ -180,7 +181,7 @@ pub(crate) fn tile_open(
     })
 }
 
-/// What is known of rows of a tile.
+/// Surveys rows of a tile.
 #[pyfunction]
 #[pyo3(signature = (tile, rows, choices, limit))]
 pub(crate) fn tile_survey(
@@ -201,7 +202,8 @@ pub(crate) fn tile_survey(
     Ok(made(py, bytes))
 }
 
-/// Refuses a tile that does not go together with the first one, by surveys of a block of each.
+/// Returns an error for a tile that does not go together with the first tile. `own` and `first` are surveys of a block of
+/// each.
 #[pyfunction]
 pub(crate) fn tile_check(
     py: Python<'_>,
@@ -217,7 +219,8 @@ pub(crate) fn tile_check(
     check().map_err(|error| raise(py, &error.into()))
 }
 
-/// The plan of a scene, with its numbers of Gaussians, buckets and groups and the buckets of each group and of each file.
+/// Returns the plan of a scene, with its numbers of Gaussians, buckets and groups, and the buckets of each group and of
+/// each file.
 #[pyfunction]
 #[pyo3(signature = (surveys, choices, one_each))]
 #[expect(clippy::type_complexity, reason = "what Python unpacks")]
@@ -239,7 +242,7 @@ pub(crate) fn tile_plan(
     Ok((made(py, bytes), gaussians, groups, files))
 }
 
-/// Of each bucket the runs of rows that it reads.
+/// Returns for each bucket the runs of rows that it reads.
 #[pyfunction]
 #[pyo3(signature = (plan, number, tile, rows, choices, limit))]
 pub(crate) fn tile_runs(
@@ -262,7 +265,7 @@ pub(crate) fn tile_runs(
     })
 }
 
-/// The rows of a tile in pieces, by bucket.
+/// Returns the rows of a tile in pieces, by bucket.
 #[pyfunction]
 #[pyo3(signature = (plan, number, tile, rows, choices, limit))]
 pub(crate) fn tile_scatter(
@@ -283,7 +286,8 @@ pub(crate) fn tile_scatter(
     Ok(pieces.into_iter().map(|(bucket, piece)| (bucket, made(py, piece))).collect())
 }
 
-/// What a look at a bucket says, what is remembered of its Gaussians, and the GPU that looked.
+/// Measures the sensitivity of a bucket. Returns the statistics, the results for its Gaussians, and the name of the GPU
+/// that drew.
 #[pyfunction]
 #[pyo3(signature = (plan, bucket, pieces, choices, limit))]
 pub(crate) fn tile_look(
@@ -308,7 +312,7 @@ pub(crate) fn tile_look(
     Ok((made(py, statistics), made(py, looked), gpu))
 }
 
-/// The steps of a scene.
+/// Returns the steps of a scene.
 #[pyfunction]
 pub(crate) fn tile_steps(
     py: Python<'_>,
@@ -322,7 +326,7 @@ pub(crate) fn tile_steps(
     Ok(made(py, bytes))
 }
 
-/// The sample of a group of buckets, which stays in the process where it was drawn.
+/// The sample of a group of buckets. It stays in the process in which it was drawn.
 #[pyclass(module = "lexisplat._native")]
 pub(crate) struct TileSample {
     plan: Plan,
@@ -356,7 +360,7 @@ impl TileSample {
         })
     }
 
-    /// Sums over the sample.
+    /// Returns sums over the sample.
     fn statistics(&self, py: Python<'_>, steps: PyBackedBytes) -> PyResult<Py<PyBytes>> {
         let bytes = without_gil(py, None, |_| {
             Ok(self.sample.statistics(&self.plan, &Steps::from_bytes(&steps)?)?.to_bytes())
@@ -365,7 +369,7 @@ impl TileSample {
     }
 }
 
-/// Everything that buckets are coded with.
+/// Returns the data with which all buckets are coded.
 #[pyfunction]
 pub(crate) fn tile_coding(
     py: Python<'_>,
@@ -381,7 +385,7 @@ pub(crate) fn tile_coding(
     Ok(made(py, bytes))
 }
 
-/// How often each symbol occurs in a bucket, and the bucket, coded with tables of its own.
+/// Returns how often each symbol occurs in a bucket, and the bucket coded with tables of its own.
 #[pyfunction]
 #[pyo3(signature = (plan, coding, bucket, pieces, looked, choices, limit))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -406,7 +410,7 @@ pub(crate) fn tile_code(
     Ok((made(py, counts), made(py, coded)))
 }
 
-/// The tables that all buckets are coded with.
+/// Returns the tables with which all buckets are coded.
 #[pyfunction]
 pub(crate) fn tile_tables(py: Python<'_>, counts: Vec<PyBackedBytes>) -> PyResult<Py<PyBytes>> {
     let bytes =
@@ -414,7 +418,7 @@ pub(crate) fn tile_tables(py: Python<'_>, counts: Vec<PyBackedBytes>) -> PyResul
     Ok(made(py, bytes))
 }
 
-/// A bucket coded with the tables of all.
+/// Returns a bucket coded with the common tables.
 #[pyfunction]
 pub(crate) fn tile_finish(
     py: Python<'_>,
@@ -431,7 +435,7 @@ pub(crate) fn tile_finish(
     Ok(made(py, bytes))
 }
 
-/// Writes file `file` of the coded buckets that `next` gives one after the other. Returns the report as JSON.
+/// Writes file `file` of the coded buckets that `next` returns one after the other. Returns the report as JSON.
 #[pyfunction]
 #[pyo3(signature = (plan, coding, tables, file, next, counts, path, *, source_bytes, overwrite, guess, gpu))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -469,7 +473,7 @@ pub(crate) fn tile_assemble(
     json(py, &report)
 }
 
-/// Packs all tiles in this process. Returns the file and its report as JSON.
+/// Packs all tiles in this process. Returns the file, and its report as JSON.
 #[pyfunction]
 #[pyo3(signature = (tiles, choices, limit))]
 pub(crate) fn tile_whole(
@@ -504,7 +508,7 @@ pub(crate) fn tile_whole(
     Ok((made(py, bytes), json(py, &report)?))
 }
 
-/// Refuses choices that are out of range, before any work.
+/// Returns an error for choices that are out of range, before any work.
 #[pyfunction]
 #[pyo3(signature = (choices, limit))]
 pub(crate) fn tile_choices(

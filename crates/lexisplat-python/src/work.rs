@@ -1,7 +1,7 @@
 //! Long work without the GIL, with progress and Ctrl-C.
 //!
-//! The work runs on a thread of its own. The thread that called waits, and every [`POLL`] it looks for signals and
-//! passes reports on, because Python handles signals on its main thread alone.
+//! The work runs on a thread of its own. The calling thread waits. After each [`POLL`] it checks for signals and passes
+//! reports on, because Python handles signals only on its main thread.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -13,13 +13,13 @@ use pyo3::prelude::*;
 
 use crate::errors::{Result, raise};
 
-/// Time between two looks at signals and reports: short for a person, long for the work.
+/// Time between two checks for signals and reports. It is short for a person and long for the work.
 pub(crate) const POLL: Duration = Duration::from_millis(50);
 
-/// A report: the stage, units done, and units in all or 0 if that is not known.
+/// A report: the stage, the number of units done, and the number of all units, or 0 if that is not known.
 type Report = (&'static str, u64, u64);
 
-/// What the work and the thread that waits for it share.
+/// State shared by the work and the thread that waits for it.
 #[derive(Debug, Default)]
 pub(crate) struct Watch {
     state: Mutex<State>,
@@ -31,7 +31,8 @@ pub(crate) struct Watch {
 #[derive(Debug, Default)]
 struct State {
     stage: Option<(&'static str, u64)>,
-    /// Reports that were not passed on yet, but for how far the stage is.
+    /// Reports of stages that began or ended and were not passed on yet. The number of units done in the current stage is
+    /// not among them.
     reports: Vec<Report>,
     is_over: bool,
 }
@@ -42,7 +43,7 @@ impl Watch {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the end of the work, at most [`POLL`]. Returns whether it is over.
+    /// Waits for the end of the work, at most [`POLL`]. Returns whether the work is over.
     fn wait(&self) -> bool {
         let state = self.state();
         let waited = self.finished.wait_timeout_while(state, POLL, |state| !state.is_over);
@@ -58,7 +59,7 @@ impl Watch {
     }
 }
 
-/// Tells the thread that waits that the work is over, also if it panicked.
+/// Tells the waiting thread on drop that the work is over, also after a panic.
 struct Over<'a>(&'a Watch);
 
 impl Drop for Over<'_> {
@@ -101,11 +102,11 @@ impl Progress for Watch {
     }
 }
 
-/// The process that first did work here; 0 before there was one.
+/// Id of the process that first did work here; 0 before any work.
 static PROCESS: AtomicU32 = AtomicU32::new(0);
 
-/// Refuses to work in a process that was forked from one that worked: threads of the pool do not survive a fork, and would
-/// be waited for without end.
+/// Returns an error in a process that was forked from a process that has done work. The threads of the pool do not
+/// survive a fork, and the work would wait for them forever.
 pub(crate) fn check_process() -> PyResult<()> {
     let own = std::process::id();
     match PROCESS.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
@@ -116,8 +117,8 @@ pub(crate) fn check_process() -> PyResult<()> {
     }
 }
 
-/// Does `work` without the GIL. `progress` is called with the stage, units done and units in all, or is `None`. A signal
-/// handler or a `progress` that raises ends the work, and what it raised is raised.
+/// Calls `work` without the GIL. `progress` is called with the stage, units done and all units; it may be `None`. If a
+/// signal handler or `progress` raises an exception, the work ends and the exception is raised.
 pub(crate) fn without_gil<T: Send>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,

@@ -1,6 +1,6 @@
-//! Views from beside given cameras, to learn what shows there.
+//! Views beside given cameras, for measuring what shows there.
 //!
-//! Who has a scene's cameras also looks from elsewhere: from nearer, from further away, from the side.
+//! People look at a scene from places beside its cameras too: from nearer, from further away and from the side.
 
 use glam::DVec3;
 use lexisplat::Geometry;
@@ -8,17 +8,18 @@ use lexisplat::Geometry;
 use crate::camera::Camera;
 use crate::surround::PLASTIC;
 
-/// Half the width of the middle of a picture, as a tangent, in which a camera's subject is looked for.
+/// Half the width of the middle of a picture, as a tangent. A camera's subject is searched for in this middle.
 const MIDDLE: f32 = 0.15;
-/// Largest weight of one Gaussian in the middle, as a share of the squared distance. A nearer one would cover it all.
+/// Largest weight of one Gaussian in the middle of a picture, as a share of the squared distance. Without this limit a
+/// near Gaussian would cover the whole middle.
 const LARGEST: f64 = 0.1;
-/// Largest turn around the subject, in radians: 60 degrees.
+/// Largest angle of a move around the subject, in radians: 60 degrees.
 const TURN: f64 = std::f64::consts::FRAC_PI_3;
-/// Least and largest distance of the subject, in distances of the given camera.
+/// Smallest and largest distance of a moved camera from the subject, in distances of the given camera.
 const DISTANCES: [f64; 2] = [0.3, 2.0];
 
-/// Returns at most `count` cameras, each made of one of `cameras`, evenly spread: moved around what that one looks at,
-/// and towards it or away from it, but with its pictures' size and its name. Cameras that look at nothing have none. The
+/// Returns at most `count` cameras beside `cameras`. Evenly chosen cameras are moved around their subject, and towards it
+/// or away from it. They keep the size of their pictures and their name. Cameras that look at nothing are skipped. The
 /// same input gives the same cameras.
 #[must_use]
 pub fn aside(geometry: &Geometry, cameras: &[Camera], count: usize) -> Vec<Camera> {
@@ -26,18 +27,18 @@ pub fn aside(geometry: &Geometry, cameras: &[Camera], count: usize) -> Vec<Camer
     let some = cameras.iter().skip(stride / 2).step_by(stride).take(count).enumerate();
     some.filter_map(|(number, camera)| {
         let moved = moved(camera, subject_distance(camera, geometry)?, number);
-        // A camera far out may be moved beyond what numbers hold.
+        // A camera far out may be moved beyond the range of `f32`.
         moved.validate().is_ok().then_some(moved)
     })
     .collect()
 }
 
-/// The `number`-th camera that is moved, of one whose subject is at `distance`.
+/// Returns the `number`-th moved camera, from a camera whose subject is at `distance`.
 fn moved(camera: &Camera, distance: f64, number: usize) -> Camera {
     let spread = |k: usize| ((number as f64 + 0.5) * PLASTIC[k]).fract();
     let [right, down, forward] =
         [0, 1, 2].map(|k| DVec3::from_array(camera.rotation.map(|row| f64::from(row[k]))));
-    // The camera turns towards a direction across the line of sight. What is perpendicular to both stays.
+    // The camera turns towards a direction across the line of sight. The axis perpendicular to both stays fixed.
     let (sine, cosine) = libm::sincos(std::f64::consts::TAU * spread(0));
     let [towards, level] = [cosine * right + sine * down, cosine * down - sine * right];
     let (turn_sine, turn_cosine) = libm::sincos(TURN * libm::sqrt(spread(1)));
@@ -52,8 +53,8 @@ fn moved(camera: &Camera, distance: f64, number: usize) -> Camera {
     Camera { position: rounded.position, rotation: rounded.rotation, ..camera.clone() }
 }
 
-/// The distance of what `camera` looks at: half of what covers the middle of its picture is nearer. `None` if nothing is
-/// there.
+/// Returns the distance of the subject of `camera`, in world units: half of the weight of the Gaussians that cover the
+/// middle of its picture is nearer. Returns `None` if no Gaussian is there.
 fn subject_distance(camera: &Camera, geometry: &Geometry) -> Option<f64> {
     let mut found: Vec<(f32, f64)> = Vec::new();
     for (position, (scales, &opacity)) in

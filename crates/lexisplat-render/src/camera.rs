@@ -7,11 +7,11 @@ use crate::tile_set::TileSet;
 /// Largest width or height of a picture, in pixels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// Largest difference of an entry of `rotation * rotation^T` from that of the identity. Files that trainers wrote are
-/// within 1e-6. More than this is a scaled or skewed view, which is not a camera's.
+/// Largest difference of an entry of `rotation * rotation^T` from the entry of the identity. In files that trainers wrote
+/// it is within 1e-6. With a larger difference the view is scaled or skewed, and is not a camera's.
 const ORTHONORMAL_TOLERANCE: f32 = 1e-2;
 
-/// Which part of a data set a camera belongs to.
+/// The part of a data set that a camera belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Split {
     /// Seen in training.
@@ -24,7 +24,7 @@ pub enum Split {
 /// describes it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// Name of the photo, as the file has it, or of the generated view.
+    /// Name of the photo, as in the file, or of the generated view.
     pub name: String,
     /// Picture width in pixels, 1 to [`MAX_SIDE`].
     pub width: u32,
@@ -39,19 +39,20 @@ pub struct Camera {
     /// Camera-to-world rotation, row by row. Its columns are the camera's right, down and forward
     /// directions in the world.
     pub rotation: [[f32; 3]; 3],
-    /// Distance of the near plane in world units, above 0. Gaussians that are not beyond it are not drawn. It is
-    /// [`NEAR_Z`](crate::conventions::NEAR_Z), the trainer's, unless something else is chosen.
+    /// Distance of the near plane in world units, above 0. Gaussians that are not beyond it are not drawn. The default is
+    /// the trainer's, [`NEAR_Z`](crate::conventions::NEAR_Z).
     pub near: f32,
-    /// Which part of the data set it belongs to, where the file says so.
+    /// Part of the data set that the camera belongs to, if the file states it.
     pub split: Option<Split>,
-    /// The tiles that are drawn; all of the picture if there is none. On a GPU sensitivities are measured on the whole
-    /// picture all the same.
+    /// The tiles to draw; `None` draws the whole picture. On a GPU sensitivities are measured on the whole picture in
+    /// either case.
     pub tiles: Option<TileSet>,
 }
 
 impl Camera {
-    /// Returns a camera whose numbers are rounded to single precision, without a split and with the trainer's near plane. `size` is width and height,
-    /// `focal` the focal lengths along x and y. What overflows becomes infinite, which [`Self::validate`] refuses.
+    /// Returns a camera with numbers rounded to single precision, without a split, and with the trainer's near plane.
+    /// `size` is the width and height, `focal` the focal lengths along x and y. Numbers that overflow become infinite,
+    /// and [`Self::validate`] refuses them.
     #[must_use]
     pub fn rounded(
         name: String,
@@ -65,7 +66,7 @@ impl Camera {
         Self { name, width, height, fx, fy, position, rotation, near: NEAR_Z, split: None, tiles: None }
     }
 
-    /// Returns this camera with another near plane, in world units, or with its own for `None`.
+    /// Returns this camera with the near plane at distance `near`, in world units. `None` keeps the near plane.
     #[must_use]
     pub fn with_near(self, near: impl Into<Option<f32>>) -> Self {
         Self { near: near.into().unwrap_or(self.near), ..self }
@@ -81,7 +82,7 @@ impl Camera {
         }
         let (from_width, from_height) = (u64::from(self.width), u64::from(self.height));
         let height = (from_height * u64::from(width) + from_width / 2) / from_width;
-        // The new height is below the old one, which fits.
+        // The new height is at most the old one, so it fits.
         self.resized(width, u32::try_from(height).unwrap_or(self.height).max(1))
     }
 
@@ -96,34 +97,35 @@ impl Camera {
         Self { width, height, fx, fy, tiles: None, ..self.clone() }
     }
 
-    /// Returns this camera with half the width and height, of which it draws the same part.
+    /// Returns this camera with half the width and half the height. A tile set becomes the tiles of the smaller picture
+    /// that contain its tiles.
     #[must_use]
     pub fn halved(&self) -> Self {
         let [width, height] = [self.width, self.height].map(|side| (side / 2).max(1));
         self.resized(width, height).with_tiles(self.tiles.as_ref().map(TileSet::halved))
     }
 
-    /// Returns this camera with the tiles that it draws.
+    /// Returns this camera with the tiles to draw.
     #[must_use]
     pub fn with_tiles(self, tiles: impl Into<Option<TileSet>>) -> Self {
         Self { tiles: tiles.into(), ..self }
     }
 
-    /// Number of pixels that it draws.
+    /// Returns the number of pixels that the camera draws.
     #[must_use]
     pub fn drawn_pixels(&self) -> u64 {
         let whole = u64::from(self.width) * u64::from(self.height);
         self.tiles.as_ref().map_or(whole, TileSet::pixels)
     }
 
-    /// Width and height of the picture that it draws. That of a tile set is as [`TileSet`] says.
+    /// Returns the width and height of the picture that the camera draws. For the picture of a tile set see [`TileSet`].
     #[must_use]
     pub fn picture_size(&self) -> [u32; 2] {
         self.tiles.as_ref().map_or([self.width, self.height], TileSet::picture_size)
     }
 
-    /// Where pixel number `drawn` of the picture that it draws, counted row by row, is in the whole picture, as (column, row);
-    /// `None` if it is beyond the border.
+    /// Returns the place in the whole picture, as (column, row), of pixel number `drawn` of the drawn picture, counted
+    /// row by row. Returns `None` if the place is beyond the border.
     #[must_use]
     pub fn place_of_drawn(&self, drawn: usize) -> Option<[usize; 2]> {
         let [width, height] = [self.width, self.height].map(|side| side as usize);
@@ -134,8 +136,8 @@ impl Camera {
         (place[0] < width && place[1] < height).then_some(place)
     }
 
-    /// The number of the pixel at `place`, as (column, row) of the whole picture, in the picture that it draws; `None` if it is
-    /// not drawn.
+    /// Returns the number in the drawn picture of the pixel at `place`, a (column, row) of the whole picture. Returns
+    /// `None` if the pixel is not drawn.
     #[must_use]
     pub fn drawn_at(&self, [column, row]: [usize; 2]) -> Option<usize> {
         let [width, height] = [self.width, self.height].map(|side| side as usize);
@@ -155,8 +157,8 @@ impl Camera {
         std::array::from_fn(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2])
     }
 
-    /// Checks that the fields are in the ranges they state, and that the rotation is orthonormal within 1e-2.
-    /// Mirrored rotations are accepted, since some published files have them.
+    /// Checks that the fields are in their documented ranges, and that the rotation is orthonormal within 1e-2. Mirrored
+    /// rotations are accepted, because some published files have them.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the field and its value.
@@ -193,7 +195,7 @@ impl Camera {
     }
 }
 
-/// Rounds to f32; what overflows becomes infinite.
+/// Rounds to `f32`. Values that overflow become infinite.
 #[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
 pub(crate) fn single(value: f64) -> f32 {
     value as f32

@@ -8,21 +8,21 @@ use crate::camera::{Camera, Split};
 use crate::error::{Error, Result};
 use crate::json::{self, Fields, List, Object, required, set};
 
-/// Most cameras in a file.
+/// Largest number of cameras in a file.
 pub const MAX_CAMERAS: usize = 100_000;
-/// Longest name of a camera, in bytes.
+/// Largest length of a camera's name, in bytes.
 pub(crate) const MAX_NAME: usize = 1024;
 
-/// Returns the cameras in `bytes`, in order. `file` names them in errors.
+/// Returns the cameras in `bytes`, in order. Errors call the bytes `file`.
 ///
 /// # Errors
-/// [`lexisplat::Error::Format`] naming the camera, by its position from 0, and the field, if the text is not such
-/// a list, a value is out of range, or it is over [`crate::MAX_CAMERAS_BYTES`] or [`MAX_CAMERAS`].
+/// [`lexisplat::Error::Format`] naming the camera, by its position from 0, and the field, if the text is not such a list,
+/// or if a value is out of range, or if the bytes or the list are over [`crate::MAX_CAMERAS_BYTES`] or [`MAX_CAMERAS`].
 pub fn read_cameras_bytes(file: &str, bytes: &[u8]) -> Result<Vec<Camera>> {
     Ok(read_placed(file, bytes)?.into_iter().map(|placed| placed.0).collect())
 }
 
-/// [`read_cameras_bytes`] with the positions before rounding.
+/// Reads cameras like [`read_cameras_bytes`], and returns each with its position before rounding.
 pub(crate) fn read_placed(file: &str, bytes: &[u8]) -> Result<Vec<(Camera, [f64; 3])>> {
     let list = List {
         expected: "a list of cameras as INRIA's cameras.json".to_owned(),

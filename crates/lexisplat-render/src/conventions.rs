@@ -1,18 +1,19 @@
-//! The numbers of the 3DGS authors' rasteriser, each in this one place.
+//! The numbers of the 3DGS authors' rasteriser. Each is defined here only.
 //!
-//! Sources are files of `graphdeco-inria/diff-gaussian-rasterization` at commit 59f5f77 unless stated
-//! otherwise. A change of any of them changes every picture.
+//! Sources are files of `graphdeco-inria/diff-gaussian-rasterization` at commit 59f5f77 unless stated otherwise. A change
+//! of any of these numbers changes every picture.
 //!
-//! The other conventions are these. View space is that of `OpenCV`: x right, y down, z forward. Pixel centres
-//! lie at integers (`ndc2Pix`: `((v + 1) * size - 1) / 2`). Gaussians are blended in order of view-space z, and
-//! those of equal z in order of index. A pixel is `colour + transmittance * background`, not clamped.
+//! The other conventions are these. View space is that of `OpenCV`: x right, y down, z forward. Pixel centres lie at
+//! integers (`ndc2Pix`: `((v + 1) * size - 1) / 2`). Gaussians are blended in order of view-space z; Gaussians of equal z
+//! are blended in order of index. A pixel is `colour + transmittance * background`, not clamped.
 
-/// A Gaussian is drawn only if its view-space z, in world units, is above this (`auxiliary.h`, `in_frustum`). It is the near
-/// plane of cameras that were given. Generated cameras have one of the scene's own size ([`crate::near_plane`]).
+/// Near plane of given cameras, in world units: a Gaussian is drawn only if its view-space z is above this
+/// (`auxiliary.h`, `in_frustum`). Generated cameras have a near plane that suits the size of the scene
+/// ([`crate::near_plane`]).
 pub const NEAR_Z: f32 = 0.2;
 
-/// Added to the homogeneous w, in world units, before dividing by it (`forward.cu`, `preprocessCUDA`). It is in proportion to
-/// the camera's near plane, so that a scene looks the same in all units.
+/// Added to the homogeneous w, in world units, before the division by w (`forward.cu`, `preprocessCUDA`). It is scaled in
+/// proportion to the camera's near plane, so that a scene looks the same in all units.
 pub const W_EPSILON: f32 = 1e-7;
 
 /// Limit of `x / z` and `y / z` in the Jacobian, in units of the tangent of half the field of view
@@ -23,36 +24,37 @@ pub const TAN_LIMIT: f32 = 1.3;
 /// `dr_aa` branch).
 pub const DILATION: f32 = 0.3;
 
-/// Least value under the square root that separates the eigenvalues, in pixels to the fourth
-/// (`forward.cu`, `preprocessCUDA`).
+/// Smallest value under the square root that separates the eigenvalues, in pixels to the fourth power (`forward.cu`,
+/// `preprocessCUDA`).
 pub const EIGEN_FLOOR: f32 = 0.1;
 
 /// Radius of a Gaussian on screen, in standard deviations of its long axis (`forward.cu`,
 /// `preprocessCUDA`).
 pub const RADIUS_SIGMAS: f32 = 3.0;
 
-/// Side of a tile in pixels (`config.h`, `BLOCK_X` and `BLOCK_Y`).
+/// Side of a tile, in pixels (`config.h`, `BLOCK_X` and `BLOCK_Y`).
 pub const TILE: usize = 16;
 
 /// Largest opacity of one Gaussian in one pixel (`forward.cu`, `renderCUDA`).
 pub const ALPHA_MAX: f32 = 0.99;
 
-/// A Gaussian whose opacity in a pixel is below this is left out of the pixel (`forward.cu`, `renderCUDA`).
+/// Smallest opacity of a Gaussian in a pixel. With a lower opacity the Gaussian is left out of the pixel (`forward.cu`,
+/// `renderCUDA`).
 pub const ALPHA_MIN: f32 = 1.0 / 255.0;
 
-/// The first Gaussian that would take a pixel's transmittance below this finishes the pixel. That Gaussian is
-/// not added (`forward.cu`, `renderCUDA`).
+/// Smallest transmittance of a pixel that is not finished. The first Gaussian that would lower the transmittance below
+/// this finishes the pixel, and is not added (`forward.cu`, `renderCUDA`).
 pub const TRANSMITTANCE_MIN: f32 = 1e-4;
 
-/// Least ratio of the determinants before and after the dilation, whose square root scales the opacity
-/// of anti-aliased scenes (`forward.cu` of the `dr_aa` branch, `preprocessCUDA`).
+/// Smallest ratio of the determinants before and after the dilation. The square root of the ratio scales the opacity in
+/// anti-aliased scenes (`forward.cu` of the `dr_aa` branch, `preprocessCUDA`).
 pub const ANTIALIAS_FLOOR: f32 = 0.000_025;
 
-/// Least length a quaternion is divided by (`graphdeco-inria/gaussian-splatting`,
-/// `scene/gaussian_model.py`, `rotation_activation`: the default of `torch.nn.functional.normalize`).
-/// The zero quaternion stays zero, and its rotation matrix is then the identity.
+/// Smallest length by which a quaternion is divided (`graphdeco-inria/gaussian-splatting`, `scene/gaussian_model.py`,
+/// `rotation_activation`: the default of `torch.nn.functional.normalize`). The zero quaternion stays zero, and its
+/// rotation matrix is then the identity.
 pub const QUATERNION_FLOOR: f32 = 1e-12;
 
-/// Slack on powers when deciding that a Gaussian cannot reach [`ALPHA_MIN`]. The errors of `exp` and of the
-/// logarithm are 1e-6 together, far below it. It makes no difference to pictures.
+/// Slack on powers in the decision that a Gaussian cannot reach [`ALPHA_MIN`]. The errors of `exp` and of the logarithm
+/// are 1e-6 together, far below this slack. The slack does not change pictures.
 pub const POWER_SLACK: f32 = 1e-4;

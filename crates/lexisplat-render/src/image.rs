@@ -8,9 +8,9 @@ const MAX_8BIT: f32 = 255.0;
 /// A picture of `width * height` RGB pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
     /// Rows from the top, pixels from the left, channels red, green, blue. 0 is black and 1 is white;
     /// drawn pictures are not clamped.
@@ -18,8 +18,8 @@ pub struct Image {
 }
 
 impl Image {
-    /// Every pixel in 8 bits a channel: clipped to \[0, 1\], times 255, rounded half up, as
-    /// `torchvision.utils.save_image` does. NaN becomes 0.
+    /// Returns every pixel in 8 bits a channel: clipped to \[0, 1\], times 255, rounded half up, like
+    /// `torchvision.utils.save_image`. NaN becomes 0.
     #[must_use]
     pub fn to_8bit(&self) -> Vec<[u8; 3]> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0.5 to 255.5")]
@@ -27,10 +27,10 @@ impl Image {
         self.pixels.iter().map(|pixel| pixel.map(byte)).collect()
     }
 
-    /// The picture whose 8-bit pixels are `pixels`, with values `byte / 255`.
+    /// Returns the picture with the 8-bit pixels `pixels`. Its values are `byte / 255`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there are not `width * height` pixels.
+    /// [`Error::Parameter`] if the number of pixels is not `width * height`.
     pub fn from_8bit(width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<Self> {
         if u64::try_from(pixels.len()) != Ok(u64::from(width) * u64::from(height)) {
             return Err(Error::parameter("pixels", pixels.len(), format!("{width} x {height} pixels")));

@@ -1,4 +1,4 @@
-//! Views from inside a scene that comes without cameras, and whether a scene is to be looked at from inside.
+//! Views from inside a scene without cameras, and the test for scenes that should be seen from inside.
 
 use glam::DVec3;
 use lexisplat::Geometry;
@@ -10,51 +10,50 @@ use crate::orbit::{TRIM, UP, axes, bulk, middle, opacity_weights, pinhole};
 use crate::surround::{PLASTIC, detail};
 use crate::transmittance::{Ray, transmittances};
 
-/// Views of [`object`] that are tried.
+/// Number of tried views of [`object`].
 const TRIED_VIEWS: usize = 8;
-/// Gaussians that each of these views should see.
+/// Number of Gaussians that each tried view should see.
 const TARGETS: usize = 24;
-/// Distance before its target at which a line of sight ends, in radii of the subject. The target's neighbours on
-/// the same surface so are not in the way.
+/// Distance before its target at which a line of sight ends, in radii of the subject. The target's neighbours on the same
+/// surface are therefore not in the way.
 const SHORT: f64 = 0.1;
-/// A target is seen if at least this share of the light arrives.
+/// Smallest share of light that must arrive from a target that is seen.
 const SEEN: f64 = 0.5;
-/// A scene is an interior only if less than this share of the lines from outside are free. It is 0.34 to 0.66 for
-/// real objects, with and without a background (bonsai, snowmiku, flowers, leica, fruit), and 0 for a made-up
-/// room.
+/// Largest share of free lines from outside in an interior. It is 0.34 to 0.66 for real objects, with and without a
+/// background (bonsai, snowmiku, flowers, leica, fruit), and 0 for a made-up room.
 const FEW: f64 = 0.15;
 
-/// A scene is an interior only if at least this share of the lines from inside are free. It is at most 0.5 for the
-/// sample scene, whose objects hide each other when they are made of few Gaussians, and 1 for a made-up room.
+/// Smallest share of free lines from inside in an interior. It is at most 0.5 for the sample scene, whose objects hide
+/// each other when they are made of few Gaussians, and 1 for a made-up room.
 const MANY: f64 = 0.7;
 
-/// Places for cameras that are tried.
+/// Number of tried places of cameras.
 const PLACES: u32 = 32;
-/// Largest distance of these places from the centre to either side, in half extents of the bulk.
+/// Largest distance of tried places from the centre to either side, in half extents of the bulk.
 const ASIDE: f64 = 0.7;
-/// Largest height of these places above the centre, in half extents of the bulk. None is below the centre: floors
-/// are there, and what is below a floor is free only because no training camera saw it.
+/// Largest height of tried places above the centre, in half extents of the bulk. No place is below the centre, because
+/// floors are there, and the space below a floor is free only because no training camera saw it.
 const ABOVE: f64 = 0.5;
-/// Directions in which the way from a place is tried.
+/// Number of directions in which the way from a place is tested.
 const DIRECTIONS: u32 = 8;
 /// Length of these ways, in radii of the bulk.
 const FREE: f64 = 0.5;
-/// Lines that have to be free before a view: its middle, and lines this far to the right and down of it, in
-/// tangents of the angle.
+/// Lines that must be free before a view: the line through its middle, and lines this far to the right of it and below
+/// it, as tangents of the angle.
 const BUNDLE: [[f64; 2]; 5] = [[0.0, 0.0], [0.4, 0.3], [-0.4, 0.3], [0.4, -0.3], [-0.4, -0.3]];
-/// Most places that views are spread over.
+/// Largest number of places from which views are taken.
 const STANDS: usize = 3;
-/// A place counts only if it has at least this share of the free ways of the best place.
+/// Smallest ratio of the free ways of a used place to those of the best place.
 const GOOD: f64 = 0.8;
-/// A view is moved to another place if less than this share of the light is left on its way.
+/// Smallest share of light on the way of a view. With less light the view is taken from another place.
 const CLEAR: f64 = 0.8;
-/// Field of view along the picture's shorter side, in degrees.
+/// Field of view along the shorter side of the picture, in degrees.
 const FIELD_OF_VIEW: f64 = 60.0;
 /// Elevations of the views, in turn, in degrees.
 const PITCH: [f64; 3] = [0.0, -12.0, 8.0];
 
-/// Returns whether `geometry` is to be looked at from inside: walls hide nearly all of its detail from the cameras
-/// of [`object`], and the places of [`interior_views`] see most of it.
+/// Returns whether `geometry` should be seen from inside: walls hide nearly all of its detail from the cameras of
+/// [`object`], and most of the detail is visible from the places of [`interior_views`].
 #[must_use]
 pub fn is_interior(geometry: &Geometry) -> bool {
     let (targets, near) = (targets(geometry), f64::from(near_plane(geometry)));
@@ -69,8 +68,8 @@ pub fn is_interior(geometry: &Geometry) -> bool {
     seen(geometry, &stands(geometry, radius, near), &targets, near).is_some_and(|share| share >= MANY)
 }
 
-/// Returns the share of the lines from `places` to `targets` that are free beyond the distance `from`; `None` if there are no
-/// lines.
+/// Returns the share of the lines from `places` to `targets` that are free beyond the distance `from`; `None` if there
+/// are no lines.
 fn seen(geometry: &Geometry, places: &[DVec3], targets: &[DVec3], from: f64) -> Option<f64> {
     let (_, radius) = subject(geometry);
     let mut lines = Vec::with_capacity(places.len() * targets.len());
@@ -85,7 +84,7 @@ fn seen(geometry: &Geometry, places: &[DVec3], targets: &[DVec3], from: f64) -> 
     (!lines.is_empty()).then(|| free as f64 / lines.len() as f64)
 }
 
-/// Returns the centres of up to [`TARGETS`] opaque Gaussians of the detail, evenly spread over the file.
+/// Returns the centres of up to [`TARGETS`] opaque Gaussians of the detail, chosen evenly in the order of the file.
 fn targets(geometry: &Geometry) -> Vec<DVec3> {
     let (centre, half) = detail(geometry);
     let all: Vec<DVec3> = geometry
@@ -100,9 +99,9 @@ fn targets(geometry: &Geometry) -> Vec<DVec3> {
     all.into_iter().step_by(step).collect()
 }
 
-/// Returns `count` upright cameras inside `geometry` that look outwards all around, named `room_000`, `room_001`
-/// and so on. They stand at a few places near the middle of the bulk that have little in front of them. The same
-/// input gives the same cameras. World y is taken to point down, as for [`crate::orbit`].
+/// Returns `count` upright cameras inside `geometry` that look outwards all around. Their names are `room_000`,
+/// `room_001` and so on. They stand at a few places near the middle of the bulk with little in front of them. World y is
+/// assumed to point down, as in [`crate::orbit`]. The same input gives the same cameras.
 #[must_use]
 pub fn interior_views(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
     let size = [width, height].map(|side| side.clamp(1, crate::MAX_SIDE));
@@ -118,7 +117,7 @@ pub fn interior_views(geometry: &Geometry, count: usize, width: u32, height: u32
         .zip(&looks)
         .enumerate()
         .map(|(at, (i, columns))| {
-            // Places take turns, unless something is in the way.
+            // Places are used in turn, unless something is in the way.
             let own = at % stands.len();
             let best = (0..stands.len()).fold(own, |a, b| if light(b, at) > light(a, at) { b } else { a });
             let stand = if light(own, at) >= CLEAR { own } else { best };
@@ -127,15 +126,15 @@ pub fn interior_views(geometry: &Geometry, count: usize, width: u32, height: u32
         .collect()
 }
 
-/// Returns direction `i` of `count`. They go around once, with the elevations in turn.
+/// Returns direction `i` of `count` directions. They go around once, with the elevations in turn.
 fn look(i: u32, count: u32) -> DVec3 {
     let (sine, cosine) = libm::sincos(f64::from(i) / f64::from(count) * std::f64::consts::TAU);
     let (up, level) = libm::sincos(PITCH[i as usize % PITCH.len()].to_radians());
     DVec3::new(sine, 0.0, -cosine) * level + UP * up
 }
 
-/// Returns the mean light left on the way along every look from every place, place by place.
-/// The ways begin at the distance `from`.
+/// Returns for each place the mean share of light left on the ways along all directions. The ways begin at the distance
+/// `from`.
 fn free_ways(
     geometry: &Geometry,
     places: &[DVec3],
@@ -155,12 +154,12 @@ fn free_ways(
     light.chunks_exact(BUNDLE.len()).map(|bundle| bundle.iter().sum::<f64>() / BUNDLE.len() as f64).collect()
 }
 
-/// Returns one to [`STANDS`] places: the freest, then those that are about as free and farthest from the others.
+/// Returns one to [`STANDS`] places: the freest place, then places that are about as free and farthest from the others.
 fn stands(geometry: &Geometry, radius: f64, near: f64) -> Vec<DVec3> {
     let (centre, half) = middle(geometry, &opacity_weights(geometry), TRIM);
     let places: Vec<DVec3> = (0..PLACES)
         .map(|i| {
-            // The first place is above the centre.
+            // The first place is above the centre of the bulk.
             let share = |k: usize| (0.5 + f64::from(i) * PLASTIC[k]).fract();
             let aside = |k: usize| ASIDE * (2.0 * share(k) - 1.0);
             centre + half * (DVec3::new(aside(0), 0.0, aside(2)) + UP * ABOVE * share(1))

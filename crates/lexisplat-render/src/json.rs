@@ -1,5 +1,5 @@
-//! Reads JSON step by step, so that errors name the object and the field, and a long list is refused while it is
-//! read.
+//! Reads JSON step by step, so that errors name the object and the field, and a list that is too long is refused while it
+//! is read.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -11,7 +11,7 @@ use serde::de::{
 use crate::error::Result;
 use crate::view_files::MAX_CAMERAS_BYTES;
 
-/// Returns what `seed` reads from `bytes`, which must hold nothing else.
+/// Returns the value that `seed` reads from `bytes`, which must hold nothing else.
 pub(crate) fn parse<'de, S: DeserializeSeed<'de>>(bytes: &'de [u8], seed: S) -> Result<S::Value, String> {
     if u64::try_from(bytes.len()).is_ok_and(|len| len > MAX_CAMERAS_BYTES) {
         return Err(format!("over the limit of {MAX_CAMERAS_BYTES} bytes"));
@@ -22,19 +22,19 @@ pub(crate) fn parse<'de, S: DeserializeSeed<'de>>(bytes: &'de [u8], seed: S) -> 
     Ok(value)
 }
 
-/// The fields of an object. They come in any order; of two with the same name the later one counts.
+/// The fields of an object. They come in any order. Of two fields with the same name the later one counts.
 pub(crate) trait Fields: Default {
-    /// What the object stands for.
+    /// The value that the object represents.
     type Value;
 
-    /// Reads the value of `key` if that is a known field. Returns whether it is.
+    /// Reads the value of `key` if it is a known field. Returns whether it is.
     fn read<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error>;
 
-    /// Returns the value. `about` is how errors begin.
+    /// Returns the value. Errors begin with `about`.
     fn finish(self, about: &str) -> Result<Self::Value, String>;
 }
 
-/// Reads a value to `slot`, and tells [`Fields::read`]'s caller so.
+/// Reads a value to `slot`. Returns `true`, for implementations of [`Fields::read`].
 pub(crate) fn set<'de, A: MapAccess<'de>, T: Deserialize<'de>>(
     slot: &mut T,
     map: &mut A,
@@ -43,21 +43,21 @@ pub(crate) fn set<'de, A: MapAccess<'de>, T: Deserialize<'de>>(
     Ok(true)
 }
 
-/// Returns the value of a field that has to be there.
+/// Returns the value of a required field.
 pub(crate) fn required<T>(value: Option<T>, field: &str, about: &str) -> Result<T, String> {
     value.ok_or_else(|| format!("{about}field '{field}' is missing"))
 }
 
 /// Reads an object.
 pub(crate) struct Object<T> {
-    /// How errors about it begin.
+    /// The beginning of errors about the object.
     pub(crate) about: String,
     pub(crate) expected: String,
     pub(crate) fields: T,
 }
 
 impl<T: Fields> Object<T> {
-    /// The object at position `index` of a list of such as are called `name`.
+    /// Returns the object at position `index` of a list of objects that are called `name`.
     pub(crate) fn element(name: &str, index: usize) -> Self {
         let about = format!("{name} {index}: ");
         Self { about, expected: format!("{name} {index} as an object"), fields: T::default() }
@@ -91,7 +91,7 @@ impl<'de, T: Fields> Visitor<'de> for Object<T> {
     }
 }
 
-/// Reads a list of at most `most` of `what`. `element` makes the seed of the element at a position.
+/// Reads a list of at most `most` of `what`. `element` makes the seed of the element at each position.
 pub(crate) struct List<F> {
     pub(crate) expected: String,
     pub(crate) most: usize,

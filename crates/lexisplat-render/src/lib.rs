@@ -1,15 +1,8 @@
 //! Cameras and rasterisers that draw 3D Gaussian Splatting scenes.
 //!
-//! A [`Scene`] is a trained model with dense SH, or a compressed one. [`render`] draws either through the same
-//! [`Radiance`] interface, and the compressed one straight from its sparse codes. The rules and numbers are those
-//! of the 3DGS authors' rasteriser: see [`conventions`].
-//!
-//! [`render`] draws on the processor, with the same bits on every machine. With the feature `gpu` (on by default)
-//! the module `gpu` draws the same pictures through Vulkan, Metal, DX12 or, in a browser, WebGPU. [`Renderer`] is
-//! one interface to both. Its methods that may wait for a GPU are async, with twins that block outside of
-//! browsers.
-//!
-//! Without the feature `parallel` (on by default) everything runs on the calling thread.
+//! [`render`] draws a [`Scene`]: a trained model with dense SH, or a compressed model. [`Radiance`] evaluates
+//! the view-dependent colours of both; a compressed model is drawn from its sparse codes, without dense SH. The rules
+//! and numbers are those of the 3DGS authors' rasteriser ([`conventions`]).
 //!
 //! ```
 //! use lexisplat::{Geometry, ShDegree, Splats};
@@ -34,6 +27,16 @@
 //!     assert!(red > 0.7 && red > blue);
 //! }
 //! ```
+//!
+//! [`render`] draws on the processor, with the same bits on every machine. With the feature `gpu` (on by default) the module `gpu`
+//! draws the same pictures through Vulkan, Metal, DX12 or, in a browser, WebGPU. [`Renderer`] is one interface to both: start
+//! there to draw many views. Methods of [`Renderer`] that may wait for a GPU are async. Each has a twin that blocks, outside of
+//! browsers.
+//!
+//! Cameras come from files ([`read_views`]), or are generated: [`orbit`], [`object`], [`interior_views`] and [`natural_views`].
+//! [`sensitivity`] and [`PictureAdjoint`] measure how pictures depend on Gaussians.
+//!
+//! Without the feature `parallel` (on by default) everything runs on the calling thread.
 
 // Tests in here share helpers with those in `tests/`, which use the crate by its name.
 #[cfg(all(test, feature = "gpu"))]

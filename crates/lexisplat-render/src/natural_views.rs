@@ -1,7 +1,7 @@
-//! Views of each part of a scene from about where photographs of it were taken.
+//! Views of each region of a scene from likely places of photographs of it.
 //!
-//! Training makes Gaussians as small as the photographs need: in a photograph a Gaussian's size is a certain share of
-//! its distance. So its size says how far away the camera may have been.
+//! Training makes Gaussians as small as the photographs need: in a photograph the size of a Gaussian is a certain share
+//! of its distance. The size of a Gaussian therefore tells how far away the camera may have been.
 
 use glam::DVec3;
 use lexisplat::Geometry;
@@ -12,20 +12,21 @@ use crate::orbit::{axes, opacity_weights, pinhole};
 use crate::surround::PLASTIC;
 use crate::transmittance::unit_rotation;
 
-/// Logarithm of a Gaussian's distance from the nearest and the farthest camera in its largest standard deviations. The
-/// mean of the Gaussians in a photograph of 400 pixels is 2.6 to 5.1 (20 to 173 views each of six scenes; docs/METHOD.md). A model
-/// trained at three times that width has Gaussians of a third of the size, so that the logarithm is ln 3 = 1.1 larger.
+/// Logarithm of a Gaussian's distance from the nearest and from the farthest camera, in its largest standard deviations.
+/// The mean of the Gaussians in a photograph of 400 pixels is 2.6 to 5.1 (20 to 173 views each of six scenes;
+/// docs/METHOD.md). A model trained at three times that width has Gaussians of a third of the size, so the logarithm is
+/// ln 3 = 1.1 larger.
 const DISTANCES: [f64; 2] = [3.0, 6.6];
-/// Focal lengths in picture widths, in turn: fields of view of 84, 67, 56 and 42 degrees.
+/// Focal lengths in picture widths, which are used in turn: fields of view of 84, 67, 56 and 42 degrees.
 const FOCALS: [f64; 4] = [0.55, 0.75, 0.95, 1.3];
-/// A direction whose y is larger than this needs another up than the world's.
+/// Largest absolute y of a direction for which the world's up can be used.
 const STEEP: f64 = 0.95;
 
 /// Returns at most `count` cameras of a `size` (width and height), named `natural_000`, `natural_001` and so on. Each
-/// looks at a Gaussian from its natural distance, mostly at its flat side. Opaque Gaussians are looked at more often.
+/// camera looks at a Gaussian from its natural distance, mostly at its flat side. Opaque Gaussians are chosen more often.
 /// Walls and other Gaussians may be in the way. The same input gives the same cameras.
 ///
-/// A scene that is moved, turned or scaled has the same views, but for their turn about the line of sight.
+/// A scene that is moved, turned or scaled has the same views, except for their rotation about the line of sight.
 #[must_use]
 pub fn natural_views(geometry: &Geometry, count: usize, size: [u32; 2]) -> Vec<Camera> {
     let size = size.map(|side| side.clamp(1, crate::MAX_SIDE));
@@ -35,7 +36,7 @@ pub fn natural_views(geometry: &Geometry, count: usize, size: [u32; 2]) -> Vec<C
     let mut sum = 0.0;
     for (i, weight) in weights.iter().enumerate().filter(|(_, w)| w.is_finite()) {
         sum += weight;
-        // Evenly spread over the sum of the weights.
+        // Gaussians are chosen evenly over the cumulative sum of the weights.
         while out.len() < count && sum * count as f64 > (out.len() as f64 + 0.5) * total {
             let Some(camera) = natural_view(geometry, i, out.len(), size) else { break };
             out.push(camera.with_near(near));
@@ -44,7 +45,7 @@ pub fn natural_views(geometry: &Geometry, count: usize, size: [u32; 2]) -> Vec<C
     out
 }
 
-/// The `number`-th view, of Gaussian `i`; `None` if its numbers are too large for that.
+/// Returns the `number`-th view, which looks at Gaussian `i`; `None` if its numbers are too large for a camera.
 fn natural_view(geometry: &Geometry, i: usize, number: usize, size: [u32; 2]) -> Option<Camera> {
     let spread = |k: usize| (number as f64 * PLASTIC[k]).fract();
     let scales = geometry.scales[i].map(f64::from);
@@ -54,7 +55,7 @@ fn natural_view(geometry: &Geometry, i: usize, number: usize, size: [u32; 2]) ->
     if !(distance > 0.0 && distance < f64::from(f32::MAX)) {
         return None;
     }
-    // Directions by their cosine with the flat side, on both sides of it.
+    // Directions are spread by the cosine of the angle to the flat side, on both sides of the Gaussian.
     let [sine, cosine] = [libm::sqrt(1.0 - spread(1)), libm::sqrt(spread(1))];
     let (turn_sine, turn_cosine) = libm::sincos(std::f64::consts::TAU * spread(2));
     let side = if number.is_multiple_of(2) { cosine } else { -cosine };

@@ -1,4 +1,4 @@
-//! The near plane of views of a scene that comes without cameras, in the scene's own size.
+//! The near plane of views of a scene without cameras, in proportion to the size of the scene.
 
 use std::borrow::Cow;
 
@@ -8,24 +8,27 @@ use crate::camera::{Camera, single};
 use crate::object::subject;
 use crate::orbit::size_at;
 
-/// Largest distance of the near plane in radii of the subject.
+/// Largest distance of the near plane, in radii of the subject.
 const NEAR_RADII: f64 = 0.1;
-/// Largest distance of the near plane in standard deviations of the middle Gaussian along its longest axis. A natural view is at
-/// least 20 standard deviations from the Gaussian that it was made for.
+/// Largest distance of the near plane, in standard deviations of the middle Gaussian along its longest axis. A natural
+/// view is at least 20 standard deviations away from the Gaussian for which it was made.
 const NEAR_SIGMAS: f64 = 3.5;
-/// One of this many Gaussians is smaller than the middle one.
+/// Inverse of the share of the Gaussians that are smaller than the middle one.
 const MIDDLE_SHARE: usize = 2;
-/// Most Gaussians that the subject is found by. Of a larger scene it is every second, third and so on.
+/// Largest number of Gaussians from which the subject is found. Of a larger scene every second, every third and so on is
+/// used.
 const MOST: usize = 1 << 16;
-/// Most cameras that [`hidden_share`] asks, evenly spread.
+/// Largest number of cameras that [`hidden_share`] examines, evenly chosen.
 const MOST_CAMERAS: usize = 16;
 
-/// Returns the distance of the near plane, in world units, above 0, for views of `geometry` that were not given: it is in
-/// proportion to the radius of the scene's subject and to its Gaussians, so that a scene shows the same in all units.
+/// Returns the distance of the near plane, in world units, above 0, for generated views of `geometry`. It is in
+/// proportion to the radius of the scene's subject and to the size of its Gaussians, so that a scene looks the same in
+/// all units.
 ///
-/// In models with cameras of their own, `room-large` among them, it is 0.08 to 0.8 units, about the trainer's 0.2. Of the area
-/// that their cameras see, 99 % is farther than 1.9 units. With a fifth of it some views judge by single Gaussians just before
-/// the camera, and `--psnr 38` on the sample scene of 1,500 Gaussians reached 40.2 dB instead of 38.2.
+/// In models with cameras of their own, `room-large` among them, it is 0.08 to 0.8 units; the trainer's is 0.2. Of the
+/// area that their cameras see, 99 % is farther than 1.9 units. With a fifth of this distance some views are judged by
+/// single Gaussians just before the camera, and `--psnr 38` on the sample scene of 1,500 Gaussians reached 40.2 dB
+/// instead of 38.2.
 #[must_use]
 pub fn near_plane(geometry: &Geometry) -> f32 {
     let step = geometry.len().div_ceil(MOST).max(1);
@@ -35,7 +38,7 @@ pub fn near_plane(geometry: &Geometry) -> f32 {
     single(by_radius.min(by_size)).clamp(f32::MIN_POSITIVE, f32::MAX)
 }
 
-/// Every `step`-th Gaussian of `geometry`, as far as [`subject`] looks at it.
+/// Returns every `step`-th Gaussian of `geometry`, with the values that [`subject`] reads.
 fn thinned(geometry: &Geometry, step: usize) -> Geometry {
     Geometry {
         positions: geometry.positions.iter().copied().step_by(step).collect(),
@@ -45,8 +48,8 @@ fn thinned(geometry: &Geometry, step: usize) -> Geometry {
     }
 }
 
-/// Returns the share, 0 to 1, of the opacity before `cameras` that their near planes hide. Gaussians count if pictures without a
-/// near plane would show their centres. The share is 0 if there are none.
+/// Returns the share, 0 to 1, of the opacity before `cameras` that their near planes hide. A Gaussian counts if its
+/// centre would be in the picture without a near plane. The share is 0 if no Gaussian counts.
 #[must_use]
 pub fn hidden_share(geometry: &Geometry, cameras: &[Camera]) -> f64 {
     let step = geometry.len().div_ceil(MOST).max(1);

@@ -1,4 +1,4 @@
-//! Views around a scene that comes without cameras.
+//! Views around a scene without cameras.
 
 use glam::DVec3;
 use lexisplat::Geometry;
@@ -6,43 +6,44 @@ use lexisplat::Geometry;
 use crate::camera::Camera;
 use crate::near::near_plane;
 
-/// Share of the opacity at either end of each axis that does not count for the bulk. Floaters and far backgrounds
-/// are many, but have little opacity.
+/// Share of the opacity at either end of each axis that is outside of the bulk. Floaters and far backgrounds are many
+/// Gaussians, but have little opacity.
 pub(crate) const TRIM: f64 = 0.2;
-/// Field of view along the picture's shorter side, in degrees.
+/// Field of view along the shorter side of the picture, in degrees.
 const FIELD_OF_VIEW: f64 = 50.0;
 /// Mean elevation of the ring above the centre, in degrees.
 const ELEVATION: f64 = 20.0;
-/// Largest difference from [`ELEVATION`], in degrees.
+/// Largest difference of an elevation from [`ELEVATION`], in degrees.
 const ELEVATION_SWAY: f64 = 10.0;
-/// Number of times that the elevation goes up and down on one turn.
+/// Number of times that the elevation rises and falls in one turn.
 const SWAYS: f64 = 3.0;
-/// Radius of the bulk, in units of the half diagonal of the trimmed box. It leaves a little space around.
+/// Radius of the bulk, in half diagonals of the trimmed box. It leaves a little space around the box.
 const AIR: f64 = 1.2;
-/// Least radius in standard deviations of a small Gaussian, for scenes whose Gaussians are all at about one place.
+/// Smallest radius, in standard deviations of a small Gaussian, for scenes whose Gaussians are all at about one place.
 const LEAST_SIGMAS: f64 = 3.0;
-/// One of this many Gaussians is smaller than that one.
+/// Inverse of the share of the Gaussians that are smaller than the small Gaussian.
 const SMALL_SHARE: usize = 10;
-/// Least radius as a share of the distance of the centre from the origin: 8 units in the last place of a position.
+/// Smallest radius, as a share of the distance of the centre from the origin: 8 units in the last place of a position.
 const LEAST_SHARE: f64 = 1e-6;
-/// Radius of a scene that has no size at all, in world units.
+/// Radius of a scene without any size, in world units.
 const NO_RADIUS: f64 = 1e-3;
-/// Natural logarithms of standard deviations are clamped to this on both sides of 0, so that their sums are finite.
+/// Largest absolute natural logarithm of a standard deviation. Logarithms are clamped to it, so that their sums are
+/// finite.
 const MAX_LOG_SCALE: f64 = 60.0;
-/// Up in the world. Scenes trained from COLMAP's cameras are about upright with y down.
+/// The direction up in the world. Scenes trained from COLMAP's cameras are about upright with y down.
 pub(crate) const UP: DVec3 = DVec3::NEG_Y;
 
-/// Returns `count` cameras on a ring around the bulk of `geometry`, named `orbit_000`, `orbit_001` and so on. The
-/// ring goes up and down, and all cameras look at its centre. The same input gives the same cameras.
+/// Returns `count` cameras on a ring around the bulk of `geometry`, named `orbit_000`, `orbit_001` and so on. The ring
+/// rises and falls, and all cameras look at its centre. The same input gives the same cameras.
 ///
-/// The bulk is where most of the opacity is, so floaters do not count. Its radius fits the field of view. World y
-/// is taken to point down, as in scenes trained from COLMAP's cameras.
+/// The bulk is the region of most of the opacity, so floaters do not count. Its radius fits the field of view. World y is
+/// assumed to point down, as in scenes trained from COLMAP's cameras.
 #[must_use]
 pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
     ring(bulk(geometry), count, [width, height], near_plane(geometry))
 }
 
-/// [`orbit`] around a centre, at a distance from which a ball of the radius fits the field of view.
+/// Returns cameras like [`orbit`] around a centre, at a distance from which a ball of the radius fits the field of view.
 pub(crate) fn ring(
     (centre, radius): ([f64; 3], f64),
     count: usize,
@@ -67,35 +68,35 @@ pub(crate) fn ring(
         .collect()
 }
 
-/// Returns right, down and forward of a camera that looks along `forward`. `up` is another direction, and points
-/// up in the picture.
+/// Returns the right, down and forward axes of a camera that looks along `forward`. `up` is a direction that points up in
+/// the picture. It must not be parallel to `forward`.
 pub(crate) fn axes(forward: DVec3, up: DVec3) -> [DVec3; 3] {
     let right = forward.cross(up).normalize();
     [right, forward.cross(right), forward]
 }
 
-/// Returns the generated camera with this width and height and this focal length, in pixels. `axes` are its
-/// right, down and forward.
+/// Returns the generated camera with this width, height and focal length, in pixels. `axes` are its right, down and
+/// forward axes.
 pub(crate) fn pinhole(name: String, size: [u32; 2], focal: f64, position: DVec3, axes: [DVec3; 3]) -> Camera {
     let rotation = std::array::from_fn(|row| axes.map(|axis| axis[row]));
     Camera::rounded(name, size, [focal; 2], position.to_array(), rotation)
 }
 
-/// Returns the centre and radius, in world units, of where most of the opacity is. The radius is above 0.
+/// Returns the centre and radius, in world units, of the region of most of the opacity. The radius is above 0.
 #[must_use]
 pub fn bulk(geometry: &Geometry) -> ([f64; 3], f64) {
     let (centre, half) = middle(geometry, &opacity_weights(geometry), TRIM);
     (centre.to_array(), (half.length() * AIR).max(least_radius(geometry, centre)))
 }
 
-/// The radius, above 0, of a scene around `centre` whose Gaussians are all at about one place.
+/// Returns the radius, above 0, of a scene around `centre` whose Gaussians are all at about one place.
 pub(crate) fn least_radius(geometry: &Geometry, centre: DVec3) -> f64 {
     let Some(size) = size_at(geometry, SMALL_SHARE) else { return NO_RADIUS };
     (LEAST_SIGMAS * size).max(LEAST_SHARE * centre.length())
 }
 
-/// The standard deviation along its longest axis, in world units, of the Gaussian than which one of `share` is smaller. `None` if
-/// no size is finite. `share` is 2 or more.
+/// Returns the standard deviation along the longest axis, in world units, of the Gaussian at the `1 / share` quantile of
+/// sizes. Returns `None` if no size is finite. `share` must be 2 or more.
 pub(crate) fn size_at(geometry: &Geometry, share: usize) -> Option<f64> {
     let largest = |scales: &[f32; 3]| scales.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
     let mut sizes: Vec<f32> = geometry.scales.iter().map(largest).filter(|size| size.is_finite()).collect();
@@ -112,8 +113,8 @@ pub(crate) fn opacity_weights(geometry: &Geometry) -> Vec<f64> {
     geometry.opacities.iter().map(|&o| 1.0 / (1.0 + libm::exp(f64::from(-o)))).collect()
 }
 
-/// Returns the weighted median of the positions, and half the extent along each axis. The share `trim` of the
-/// weight at either end does not count for the extent.
+/// Returns the weighted median of the positions, and half the extent along each axis. The share `trim` of the weight at
+/// either end is excluded from the extent.
 pub(crate) fn middle(geometry: &Geometry, weights: &[f64], trim: f64) -> (DVec3, DVec3) {
     let spans: [[f64; 3]; 3] = std::array::from_fn(|axis| {
         let values = geometry.positions.iter().map(|p| f64::from(p[axis]));
@@ -123,7 +124,7 @@ pub(crate) fn middle(geometry: &Geometry, weights: &[f64], trim: f64) -> (DVec3,
     (centre, DVec3::from_array(spans.map(|[low, _, high]| (high - low) / 2.0)))
 }
 
-/// Returns the values below which the given shares of the weight lie; 0 if there are no values. Pairs of value and
+/// Returns the values below which the given shares of the weight lie; 0 if there are no values. Pairs of a value and a
 /// weight that are not finite do not count.
 fn quantiles<const N: usize>(values: impl Iterator<Item = (f64, f64)>, shares: [f64; N]) -> [f64; N] {
     let mut sorted: Vec<(f64, f64)> = values.filter(|(v, w)| v.is_finite() && w.is_finite()).collect();

@@ -1,5 +1,4 @@
-//! rayon's loops over slices and ranges, or, without the feature `parallel`, the same loops on the calling
-//! thread under the same names.
+//! The loops of rayon over slices and ranges. Without the feature `parallel` these names are loops on the calling thread.
 
 #[cfg(feature = "parallel")]
 pub(crate) use rayon::prelude::*;

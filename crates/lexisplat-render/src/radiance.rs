@@ -1,24 +1,24 @@
-//! Works out the colour of a Gaussian seen from a direction, however its SH-rest is stored.
+//! Computes the colour of a Gaussian seen from a direction, from dense or sparse SH-rest.
 
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, MAX_COEFFICIENTS, rest_basis};
 use lexisplat::{CodedRest, Dictionary, ShDegree, SparseCodes};
 
 use crate::scene::Scene;
 
-/// Independent sums of a dot product, so that additions need not wait for each other. The number decides how the
-/// result is rounded, so it is the same everywhere.
+/// Number of independent sums of a dot product, so that additions need not wait for each other. The number decides how
+/// the result is rounded, so it is the same everywhere.
 const LANES: usize = 4;
-/// Channels of an interleaved atom: red, green, blue, and one zero that fills the register up.
+/// Number of channels of an interleaved atom: red, green, blue, and a zero that pads the register.
 const PADDED: usize = 4;
 
-/// A scene's view-dependent colour.
+/// The view-dependent colours of a scene.
 ///
-/// Sparse codes are never expanded. For each nonzero the atom's three channels are multiplied with the basis, and
-/// only three sums are kept: `SH(sum_j a_j d_j) = sum_j a_j SH(d_j)`.
+/// Sparse codes are never expanded to dense SH. For each nonzero the three channels of the atom are multiplied with the
+/// basis, and only three sums are kept: `SH(sum_j a_j d_j) = sum_j a_j SH(d_j)`.
 #[derive(Debug)]
 pub struct Radiance<'a> {
     degree: ShDegree,
-    /// The highest degree that counts; at most `degree`.
+    /// Highest degree that is evaluated; at most `degree`.
     shown: ShDegree,
     dc: &'a [[f32; 3]],
     rest: Rest<'a>,
@@ -33,7 +33,7 @@ enum Rest<'a> {
 type Basis = [f32; MAX_COEFFICIENTS - 1];
 
 impl<'a> Radiance<'a> {
-    /// Returns the radiance of `scene`. Copies the dictionary and nothing else.
+    /// Returns the radiance of `scene`. Only the dictionary is copied.
     #[must_use]
     pub fn new(scene: &Scene<'a>) -> Self {
         let rest = match scene {
@@ -46,14 +46,14 @@ impl<'a> Radiance<'a> {
         Self { degree, shown: degree, dc: &scene.geometry().dc, rest }
     }
 
-    /// Leaves out the bands above `degree`, if that is given and below the scene's own.
+    /// Leaves out the bands above `degree`. `None` leaves out none.
     #[must_use]
     pub fn up_to(self, degree: Option<ShDegree>) -> Self {
         Self { shown: degree.map_or(self.degree, |most| most.min(self.degree)), ..self }
     }
 
-    /// Returns the colour of Gaussian `i` for the unit vector `direction`, which points from the camera to it:
-    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel, over the bands that count. It is NaN
+    /// Returns the colour of Gaussian `i` for the unit vector `direction`, which points from the camera to the Gaussian:
+    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel, over the evaluated bands. The colour is NaN
     /// where the sum is not finite.
     ///
     /// # Panics
@@ -64,7 +64,7 @@ impl<'a> Radiance<'a> {
         let per_channel = self.degree.rest_per_channel();
         let mut rest = [0.0; CHANNELS];
         if self.shown.rest_per_channel() > 0 {
-            // The basis is zero above the degree shown, which leaves those bands out.
+            // The basis is zero above the evaluated degree, which leaves those bands out.
             let basis = rest_basis(self.shown, direction);
             rest = match &self.rest {
                 Rest::Dense(all) => {
@@ -87,7 +87,7 @@ impl<'a> Radiance<'a> {
 /// Returns the dot products of the three channels of a channel-major row with the basis.
 #[inline(always)]
 fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
-    // A number of coefficients that the compiler knows makes the loops a few vector instructions.
+    // With a number of coefficients that the compiler knows, the loops become a few vector instructions.
     match per_channel {
         3 => dense_of::<3>(row, basis),
         8 => dense_of::<8>(row, basis),
@@ -97,7 +97,7 @@ fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
     }
 }
 
-/// [`dense`] for `N` coefficients a channel.
+/// Returns the result of [`dense`] for `N` coefficients a channel.
 #[inline(always)]
 fn dense_of<const N: usize>(row: &[f32], basis: &Basis) -> [f32; CHANNELS] {
     let mut sums = [0.0; CHANNELS];
@@ -117,7 +117,7 @@ fn dense_of<const N: usize>(row: &[f32], basis: &Basis) -> [f32; CHANNELS] {
     sums
 }
 
-/// Returns the dot products for a code: `sum_j value_j * (basis . atom_j)`.
+/// Returns the dot products of a code: `sum_j value_j * (basis . atom_j)`.
 #[inline(always)]
 fn sparse(
     code: impl Iterator<Item = (usize, f32)>,

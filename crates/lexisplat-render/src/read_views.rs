@@ -1,4 +1,4 @@
-//! Reads cameras of any kind, told apart by content.
+//! Reads cameras of any format. The format is recognised by content.
 
 #[cfg(not(target_family = "wasm"))]
 use std::path::Path;
@@ -14,18 +14,18 @@ use crate::transforms::{self, read_transforms_bytes};
 use crate::view_files::ViewFiles;
 use crate::view_set::{SizeOf, ViewSet};
 
-/// Files of a COLMAP model; any of them stands for its folder.
+/// Files of a COLMAP model. Each of them stands for its folder.
 #[cfg(not(target_family = "wasm"))]
 const COLMAP_FILES: [&str; 4] = ["cameras.bin", "images.bin", "cameras.txt", "images.txt"];
-/// Names of a file of cameras in a folder, in the order in which they are looked for.
+/// Names of files of cameras in a folder, in the order of the search.
 const JSON_FILES: [&str; 2] = ["transforms.json", "cameras.json"];
 
-/// Reads the cameras of a folder: the first found of a COLMAP model, here or in `sparse/0`, `sparse` or
-/// `colmap/sparse/0`; `transforms_train.json` with `transforms_test.json`; `transforms.json`; `cameras.json`.
+/// Reads the cameras of a folder. The first found of these is read: a COLMAP model, in the folder or in `sparse/0`,
+/// `sparse` or `colmap/sparse/0`; `transforms_train.json` with `transforms_test.json`; `transforms.json`; `cameras.json`.
 ///
 /// # Errors
-/// [`lexisplat::Error::Format`] if there is none of these, or a file is damaged; [`lexisplat::Error::Limit`] if it has too much of
-/// something; [`lexisplat::Error::Io`] if it cannot be read.
+/// [`lexisplat::Error::Format`] if none of these exists, or a file is damaged; [`lexisplat::Error::Limit`] if a file has
+/// too much of something; [`lexisplat::Error::Io`] if a file cannot be read.
 pub fn read_view_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) -> Result<ViewSet> {
     if let Some(model) = colmap::find(files) {
         return colmap::read(files, &model);
@@ -43,11 +43,11 @@ pub fn read_view_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) ->
     ))
 }
 
-/// Reads the cameras in `bytes`: a JSON list as [`crate::read_cameras_bytes`], a JSON object as
-/// [`read_transforms_bytes`]. `file` stands for them in errors.
+/// Reads the cameras in `bytes`: a JSON list like [`crate::read_cameras_bytes`], and a JSON object like
+/// [`read_transforms_bytes`]. Errors call the bytes `file`.
 ///
 /// # Errors
-/// [`lexisplat::Error::Format`] if they are neither; otherwise as those two.
+/// [`lexisplat::Error::Format`] if the bytes are neither; otherwise as these two functions.
 pub fn read_views_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result<ViewSet> {
     let bytes = lexisplat::without_byte_order_mark(bytes);
     match bytes.iter().find(|byte| !byte.is_ascii_whitespace()) {
@@ -60,14 +60,14 @@ pub fn read_views_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result
     }
 }
 
-/// Reads the cameras of `path`, whichever kind it is:
+/// Reads the cameras of `path`, in any format:
 ///
-/// - a folder, as [`read_view_files`];
-/// - a file of a COLMAP model: its folder, as [`read_colmap`];
-/// - another file, as [`read_views_bytes`].
+/// - a folder is read like [`read_view_files`];
+/// - a file of a COLMAP model is read with its folder, like [`read_colmap`];
+/// - another file is read like [`read_views_bytes`].
 ///
 /// # Errors
-/// As those three.
+/// As these three functions.
 #[cfg(not(target_family = "wasm"))]
 pub fn read_views(path: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
     let path = path.as_ref();
@@ -93,8 +93,8 @@ pub fn read_cameras(path: impl AsRef<Path>) -> Result<Vec<Camera>> {
     read_cameras_bytes(&file, &bytes)
 }
 
-/// Reads the COLMAP model of `folder`, or of its `sparse/0`, `sparse` or `colmap/sparse/0`: the binary files if
-/// both are there, otherwise the text files. See [`crate::read_colmap_binary`].
+/// Reads the COLMAP model of `folder`, or of its `sparse/0`, `sparse` or `colmap/sparse/0`. The binary files are read if
+/// both exist, otherwise the text files. See [`crate::read_colmap_binary`].
 ///
 /// # Errors
 /// [`lexisplat::Error::Io`] if a file cannot be read; [`lexisplat::Error::Format`] if there is no model, or as

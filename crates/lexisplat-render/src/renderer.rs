@@ -18,12 +18,12 @@ use crate::wait::block_on;
 /// The device to draw on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Device {
-    /// The best GPU that is not software; the processor if there is none.
+    /// The best GPU that is not software, or the processor if there is none.
     #[default]
     Auto,
-    /// The processor, which gives the same bits on every machine.
+    /// The processor. It gives the same bits on every machine.
     Cpu,
-    /// The best GPU, or software such as lavapipe if there is nothing else.
+    /// The best GPU. Software such as lavapipe counts if there is nothing else.
     Gpu,
     /// The GPU at this place in `gpu::adapters`.
     Index(usize),
@@ -44,7 +44,7 @@ impl FromStr for Device {
     }
 }
 
-/// Draws scenes on the device that it was opened for.
+/// Draws scenes on the device for which it was opened.
 #[derive(Debug)]
 pub struct Renderer {
     #[cfg(feature = "gpu")]
@@ -56,7 +56,7 @@ pub struct Renderer {
 #[derive(Debug)]
 pub struct Prepared<'a> {
     scene: Scene<'a>,
-    /// The processor's, from one picture to the next.
+    /// Memory of the processor, kept from one picture to the next.
     workspace: Mutex<Workspace>,
     #[cfg(feature = "gpu")]
     gpu: Option<GpuScene>,
@@ -76,11 +76,11 @@ impl Renderer {
         }
     }
 
-    /// Opens `device`. [`Device::Auto`] opens the processor where there is no GPU.
+    /// Opens `device`. [`Device::Auto`] opens the processor if there is no GPU.
     ///
     /// # Errors
-    /// [`Error::Gpu`] if a GPU was asked for and there is none, or it refuses; [`Error::Parameter`] for a
-    /// number out of range.
+    /// [`Error::Gpu`] if a GPU was asked for and there is none, or the GPU fails; [`Error::Parameter`] for a number out
+    /// of range.
     #[cfg(feature = "gpu")]
     pub async fn open_async(device: Device) -> Result<Self> {
         match device.open_gpu_async().await? {
@@ -98,7 +98,7 @@ impl Renderer {
         pollster::block_on(Self::open_async(device))
     }
 
-    /// Opens `device`, which must be the processor: this was built without the feature `gpu`.
+    /// Opens `device`, which must be the processor, because this crate was built without the feature `gpu`.
     ///
     /// # Errors
     /// [`Error::Gpu`] if a GPU was asked for.
@@ -115,7 +115,7 @@ impl Renderer {
     /// Makes a renderer that draws on `gpu`.
     ///
     /// # Errors
-    /// [`Error::Gpu`] if its driver refuses a kernel.
+    /// [`Error::Gpu`] if the driver refuses a kernel.
     #[cfg(feature = "gpu")]
     pub async fn on_async(gpu: &Gpu) -> Result<Self> {
         let name = gpu.summary().name.clone();
@@ -131,13 +131,13 @@ impl Renderer {
         gpu.block_on(Self::on_async(gpu))
     }
 
-    /// The name of what it draws on: `cpu`, or that of the GPU.
+    /// Returns the name of the device: `cpu`, or the name of the GPU.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Whether it draws on a GPU.
+    /// Returns whether the device is a GPU.
     #[must_use]
     pub fn is_gpu(&self) -> bool {
         #[cfg(feature = "gpu")]
@@ -146,11 +146,11 @@ impl Renderer {
         false
     }
 
-    /// Makes `scene` ready to be drawn: uploads it to the GPU as it is stored.
+    /// Prepares `scene` for drawing. On a GPU the scene is uploaded in its own representation.
     ///
     /// # Errors
-    /// [`Error::Codec`] if the scene's arrays do not fit one another; [`Error::GpuLimit`] or [`Error::Gpu`] if
-    /// it does not fit on the GPU.
+    /// [`Error::Codec`] if the lengths of the scene's arrays do not match; [`Error::GpuLimit`] or [`Error::Gpu`] if the
+    /// scene does not fit on the GPU.
     pub async fn prepare_async<'a>(&self, scene: Scene<'a>) -> Result<Prepared<'a>> {
         scene.validate()?;
         Ok(Prepared {
@@ -167,8 +167,8 @@ impl Renderer {
     /// Draws a scene that this renderer prepared, as `camera` sees it.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the camera cannot be drawn with; on a GPU also [`Error::GpuLimit`] if the view
-    /// needs more than it has, and [`Error::Gpu`] if it fails.
+    /// [`Error::Parameter`] if the camera is not valid; on a GPU also [`Error::GpuLimit`] if the view needs more than the
+    /// GPU has, and [`Error::Gpu`] if the GPU fails.
     pub async fn render_async(
         &mut self,
         prepared: &Prepared<'_>,
@@ -183,7 +183,8 @@ impl Renderer {
                 None => whole,
             });
         }
-        // A picture drawn from another thread at the same time, or one that panicked, has memory of its own.
+        // A picture that is drawn from another thread at the same time has memory of its own. So has a picture after a
+        // panic.
         let mut own = Workspace::default();
         let mut shared = prepared.workspace.try_lock().ok();
         let workspace = shared.as_deref_mut().unwrap_or(&mut own);
@@ -191,8 +192,8 @@ impl Renderer {
         Ok(render_with(workspace, &prepared.scene, camera, options)?.image)
     }
 
-    /// Returns how much the pictures of `scene` from `cameras` change with each value of each Gaussian: see
-    /// [`crate::sensitivity`]. Reports `Stage::Draw`, in views, to `progress`.
+    /// Returns the sensitivity of the pictures of `scene` from `cameras` to each value of each Gaussian, like
+    /// [`crate::sensitivity`]. Reports `Stage::Draw` to `progress`, in views.
     ///
     /// # Errors
     /// [`Error::Codec`] if `progress` cancelled the work; otherwise as [`Self::prepare_async`] and
@@ -212,7 +213,7 @@ impl Renderer {
     }
 }
 
-/// The methods above for threads that may block.
+/// Blocking twins of the methods above.
 #[cfg(not(target_family = "wasm"))]
 impl Renderer {
     /// Blocks on [`Self::prepare_async`].
@@ -249,7 +250,7 @@ impl Renderer {
         block_on(self.poll(), self.sensitivity_async(scene, cameras, progress))
     }
 
-    /// Returns what lets the GPU go on while a thread blocks on it.
+    /// Returns the function that polls the GPU while a thread blocks on it.
     fn poll(&self) -> impl FnMut() -> Result<()> + use<> {
         #[cfg(feature = "gpu")]
         let gpu = self.gpu.as_ref().map(|(gpu, _)| gpu.clone());

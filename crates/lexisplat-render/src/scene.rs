@@ -1,4 +1,4 @@
-//! What can be drawn: a trained scene or a compressed one.
+//! The scenes that can be drawn: trained scenes and compressed ones.
 
 use lexisplat::{Geometry, Model, SceneMeta, ShDegree, Splats};
 
@@ -7,9 +7,9 @@ use crate::error::Result;
 /// A scene to draw, borrowed.
 #[derive(Debug, Clone, Copy)]
 pub enum Scene<'a> {
-    /// With dense SH, as a PLY holds it.
+    /// A scene with dense SH, as in a PLY.
     Dense(&'a Splats),
-    /// With a dictionary and sparse codes, as a .lexi holds it; never expanded to dense SH.
+    /// A scene with a dictionary and sparse codes, as in a .lexi. It is never expanded to dense SH.
     Sparse(&'a Model),
 }
 
@@ -26,7 +26,7 @@ impl<'a> From<&'a Model> for Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// Everything but SH-rest.
+    /// Returns everything but SH-rest.
     #[must_use]
     pub fn geometry(&self) -> &'a Geometry {
         match self {
@@ -35,7 +35,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Comments and marks.
+    /// Returns the comments and marks.
     #[must_use]
     pub fn meta(&self) -> &'a SceneMeta {
         match self {
@@ -44,7 +44,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// SH degree.
+    /// Returns the SH degree.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
         match self {
@@ -58,20 +58,20 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::Codec`](crate::Error::Codec) naming the array and its length.
     pub fn validate(&self) -> Result<()> {
-        // A model checks its arrays when it is made.
+        // The arrays of a model were checked when it was made.
         if let Self::Dense(splats) = self {
             splats.validate()?;
         }
         Ok(())
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         self.geometry().len()
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.geometry().is_empty()

@@ -1,10 +1,10 @@
-//! How far two pictures are apart.
+//! The squared error of two pictures.
 
 use crate::error::{Error, Result};
 use crate::image::Image;
 
-/// Returns the sum of the squared differences of all channels of two pictures, each clipped to 0..1; NaN counts as 0.
-/// Their PSNR in dB is `-10 log10` of it over the number of channels.
+/// Returns the sum of the squared differences of all channels of two pictures, each clipped to 0..1. NaN counts as 0. The
+/// PSNR in dB is `-10 log10(sum / channels)`, where `channels` is three times the number of pixels.
 ///
 /// # Errors
 /// [`Error::Parameter`] if the pictures differ in size.

@@ -1,4 +1,4 @@
-//! Views from all around a scene that comes without cameras, to learn what shows in it.
+//! Views from all around a scene without cameras, for measuring what shows in it.
 
 use glam::DVec3;
 use lexisplat::Geometry;
@@ -7,7 +7,7 @@ use crate::camera::Camera;
 use crate::near::near_plane;
 use crate::orbit::{axes, least_radius, middle, pinhole};
 
-/// Share of the detail at either end of each axis that does not count for its radius.
+/// Share of the detail at either end of each axis that is excluded from its radius.
 const TRIM: f64 = 0.2;
 /// Angle between neighbouring points of a Fibonacci spiral: the golden angle.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
@@ -17,15 +17,15 @@ pub const PLASTIC: [f64; 4] =
     [0.754_877_666_246_692_7, 0.569_840_290_998_053_2, 0.430_159_709_001_946_8, 0.324_717_957_244_746];
 /// Focal length in picture widths: a field of view of 53 degrees.
 const FOCAL: f64 = 1.0;
-/// A direction whose y is larger than this needs another up than the world's.
+/// Largest absolute y of a direction for which the world's up can be used.
 const STEEP: f64 = 0.9;
 
 /// Returns `count` cameras of a `size` (width and height) on all sides of the scene's detail, named `surround_000`,
-/// `surround_001` and so on. They look at points of the detail from `distances`, nearest and farthest, in radii
-/// of it. The same input gives the same cameras.
+/// `surround_001` and so on. They look at points of the detail. `distances` are the smallest and the largest distance, in
+/// radii of the detail. The same input gives the same cameras.
 ///
-/// The detail is where small opaque Gaussians are, for that is where training cameras looked. Where those stood is
-/// not known, so some views are from behind walls or below the floor.
+/// The detail is the region of small opaque Gaussians, because training cameras looked there. The places of training
+/// cameras are not known, so some views are from behind walls or below the floor.
 #[must_use]
 pub fn surround(geometry: &Geometry, count: usize, size: [u32; 2], distances: [f64; 2]) -> Vec<Camera> {
     let size = size.map(|side| side.clamp(1, crate::MAX_SIDE));

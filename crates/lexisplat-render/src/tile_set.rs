@@ -5,22 +5,22 @@ use crate::error::{Error, Result};
 #[cfg(any(test, feature = "gpu"))]
 use crate::image::Image;
 
-/// Some of the tiles of a picture, in the order of rows and then of columns.
+/// A selection of the tiles of a picture, in the order of rows and then of columns.
 ///
-/// A camera with a tile set draws those tiles alone, with the same bits as in the whole picture. The picture that comes out is
-/// one tile wide. Its tiles lie below one another, and pixels beyond the border of the whole picture show the background.
+/// A camera with a tile set draws only these tiles, with the same bits as in the whole picture. The drawn picture is one
+/// tile wide: the tiles lie below one another. Pixels beyond the border of the whole picture show the background.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TileSet {
     /// Sides of the whole picture, in pixels.
     size: [u32; 2],
-    /// Numbers of the tiles, in ascending order.
+    /// Numbers of the tiles in the whole picture, in ascending order.
     tiles: Vec<u32>,
-    /// Pixels of the tiles that are within the picture.
+    /// Number of pixels of the tiles within the picture.
     pixels: u64,
 }
 
 impl TileSet {
-    /// The tiles, as (column, row), that `wanted` chooses of a picture of `width` by `height` pixels.
+    /// Returns the tiles for which `wanted` is true at their (column, row), of a picture of `width` by `height` pixels.
     #[must_use]
     pub fn new(width: u32, height: u32, wanted: impl Fn(u32, u32) -> bool) -> Self {
         let side = |pixels: u32| pixels.div_ceil(TILE_U32);
@@ -36,19 +36,19 @@ impl TileSet {
         Self { size: [width, height], tiles, pixels }
     }
 
-    /// Numbers of the tiles in the whole picture, counted row by row, in ascending order.
+    /// Returns the numbers of the tiles in the whole picture, counted row by row, in ascending order.
     #[must_use]
     pub fn tiles(&self) -> &[u32] {
         &self.tiles
     }
 
-    /// Number of pixels that are within the picture.
+    /// Returns the number of pixels of the tiles within the picture.
     #[must_use]
     pub fn pixels(&self) -> u64 {
         self.pixels
     }
 
-    /// The tiles of a picture of half the width and height in which one of these is.
+    /// Returns the tiles of a picture of half the width and height that contain one of these tiles.
     #[must_use]
     pub fn halved(&self) -> Self {
         let columns = self.size[0].div_ceil(TILE_U32).max(1);
@@ -60,8 +60,8 @@ impl TileSet {
         Self::new(width, height, |column, row| places.binary_search(&[row, column]).is_ok())
     }
 
-    /// Where pixel number `drawn` of the picture of these tiles is in the whole one, as (column, row), within the border or
-    /// beyond it; `None` if there is no such pixel.
+    /// Returns the place in the whole picture, as (column, row), of pixel number `drawn` of the picture of these tiles.
+    /// The place may be beyond the border. Returns `None` if there is no such pixel.
     pub(crate) fn place_of_drawn(&self, drawn: usize) -> Option<[usize; 2]> {
         let columns = self.size[0].div_ceil(TILE_U32).max(1);
         let tile = *self.tiles.get(drawn / (TILE * TILE))?;
@@ -69,7 +69,8 @@ impl TileSet {
         Some([corner[0] + drawn % TILE, corner[1] + drawn / TILE % TILE])
     }
 
-    /// The number of the pixel at `place` of the whole picture in the picture of these tiles; `None` if it is in none of them.
+    /// Returns the number in the picture of these tiles of the pixel at `place` of the whole picture; `None` if the pixel
+    /// is in no tile of the set.
     pub(crate) fn drawn_at(&self, [column, row]: [usize; 2]) -> Option<usize> {
         let columns = self.size[0].div_ceil(TILE_U32).max(1) as usize;
         let tile = u32::try_from(row / TILE * columns + column / TILE).ok()?;
@@ -77,7 +78,7 @@ impl TileSet {
         Some(number * TILE * TILE + row % TILE * TILE + column % TILE)
     }
 
-    /// Whether this is of pictures of `width` by `height` pixels, and not empty.
+    /// Checks that the set is of pictures of `width` by `height` pixels, and not empty.
     pub(crate) fn check(&self, width: u32, height: u32) -> Result<()> {
         if self.size == [width, height] && !self.tiles.is_empty() {
             return Ok(());
@@ -87,12 +88,12 @@ impl TileSet {
         Err(Error::parameter("tiles", given, format!("at least one tile of {width} x {height} pixels")))
     }
 
-    /// Width and height of the picture of these tiles.
+    /// Returns the width and height of the picture of these tiles.
     pub(crate) fn picture_size(&self) -> [u32; 2] {
         [TILE_U32, u32::try_from(self.tiles.len()).unwrap_or(u32::MAX).saturating_mul(TILE_U32)]
     }
 
-    /// The picture of these tiles, cut out of the whole one over `background`.
+    /// Returns the picture of these tiles, cut out of the picture `whole`. Pixels beyond its border are `background`.
     #[cfg(any(test, feature = "gpu"))]
     pub(crate) fn cut(&self, whole: &Image, background: [f32; 3]) -> Image {
         let [width, height] = self.picture_size();

@@ -1,4 +1,4 @@
-//! Works out how much light passes through a scene along a line.
+//! Computes how much light passes through a scene along a line.
 
 use glam::{DMat3, DQuat, DVec3};
 use lexisplat::Geometry;
@@ -6,36 +6,37 @@ use lexisplat::Geometry;
 use crate::conventions::{ALPHA_MAX, ALPHA_MIN};
 use crate::parallel::*;
 
-/// Gaussians that one task sums. The sums of tasks are added in order, so that the result does not depend on the
-/// number of threads.
+/// Number of Gaussians that one task sums. The sums of tasks are added in order, so that the result does not depend on
+/// the number of threads.
 const GAUSSIANS_PER_TASK: usize = 8192;
-/// Most Gaussians that are looked at. Of a larger scene every second, third and so on is, and counts two, three
-/// and so on times. That is enough to tell what is in the way, and takes seconds for the largest scenes.
+/// Largest number of Gaussians that are looked at. Of a larger scene every second, every third and so on is looked at,
+/// and counts two, three and so on times. This is enough to tell what is in the way, and takes seconds for the largest
+/// scenes.
 const MAX_ASKED: usize = 1 << 20;
-/// Beyond this many standard deviations every Gaussian is below [`ALPHA_MIN`]: `sqrt(2 ln 255)`.
+/// Number of standard deviations beyond which every Gaussian is below [`ALPHA_MIN`]: `sqrt(2 ln 255)`.
 const REACH_SIGMAS: f64 = 3.33;
-/// Natural logarithms of scales are clamped to this on both sides of 0, so that squares of scales and of their
+/// Largest absolute natural logarithm of a scale. Logarithms are clamped to it, so that squares of scales and of their
 /// reciprocals are finite.
 const MAX_LOG_SCALE: f64 = 60.0;
 
-/// A piece of a straight line.
+/// A segment of a straight line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ray {
     pub(crate) origin: DVec3,
-    /// Of length 1.
+    /// Direction, of length 1.
     pub(crate) direction: DVec3,
-    /// The distances from the origin at which the piece begins and ends, in world units.
+    /// Distances from the origin at which the segment begins and ends, in world units.
     pub(crate) from: f64,
     pub(crate) to: f64,
 }
 
-/// Returns the share of light left along every ray, 0 to 1. It is the product of `1 - alpha` over the Gaussians
-/// whose densest point on the ray lies on its piece, with their alpha at that point.
+/// Returns the share of light left along every ray, 0 to 1. It is the product of `1 - alpha` over the Gaussians whose
+/// densest point on the line lies on the segment, with their alpha at that point.
 pub(crate) fn transmittances(geometry: &Geometry, rays: &[Ray]) -> Vec<f64> {
     thinned(geometry, rays, geometry.len().div_ceil(MAX_ASKED).max(1))
 }
 
-/// [`transmittances`] by every `step`-th Gaussian.
+/// Returns the result of [`transmittances`] from every `step`-th Gaussian.
 fn thinned(geometry: &Geometry, rays: &[Ray], step: usize) -> Vec<f64> {
     let asked = geometry.len().div_ceil(step);
     let sums: Vec<Vec<f64>> = (0..asked.div_ceil(GAUSSIANS_PER_TASK))
@@ -52,7 +53,7 @@ fn thinned(geometry: &Geometry, rays: &[Ray], step: usize) -> Vec<f64> {
     totals.into_iter().map(|log| libm::exp(log * step as f64)).collect()
 }
 
-/// Returns the logarithms of the light that some of the Gaussians leave of every ray.
+/// Returns the logarithms of the shares of light that the Gaussians `some` leave along every ray.
 fn logs(geometry: &Geometry, some: impl Iterator<Item = usize>, rays: &[Ray]) -> Vec<f64> {
     let mut logs = vec![0.0; rays.len()];
     for i in some {
@@ -66,7 +67,7 @@ fn logs(geometry: &Geometry, some: impl Iterator<Item = usize>, rays: &[Ray]) ->
     logs
 }
 
-/// The rotation that a Gaussian's quaternion (w, x, y, z) of any length means; none if it has no length.
+/// Returns the rotation of a Gaussian's quaternion (w, x, y, z) of any length; no rotation if the length is 0.
 pub(crate) fn unit_rotation(quaternion: [f32; 4]) -> DQuat {
     let [w, x, y, z] = quaternion.map(f64::from);
     let rotation = DQuat::from_xyzw(x, y, z, w);
@@ -77,14 +78,14 @@ pub(crate) fn unit_rotation(quaternion: [f32; 4]) -> DQuat {
 struct Gaussian {
     centre: DVec3,
     alpha: f64,
-    /// Largest distance from its centre at which it shows, in world units.
+    /// Largest distance from its centre at which the Gaussian shows, in world units.
     reach: f64,
     rotation: DQuat,
     scales: DVec3,
 }
 
 impl Gaussian {
-    /// Returns the Gaussian at `i`; `None` if it does not show or is not finite.
+    /// Returns Gaussian `i`; `None` if it does not show or is not finite.
     fn new(geometry: &Geometry, i: usize) -> Option<Self> {
         let alpha = 1.0 / (1.0 + libm::exp(-f64::from(*geometry.opacities.get(i)?)));
         let centre = DVec3::from_array(geometry.positions.get(i)?.map(f64::from));
@@ -101,7 +102,8 @@ impl Gaussian {
         Some(Self { centre, alpha, reach, rotation, scales })
     }
 
-    /// Returns its alpha where it is densest on the ray; `None` if that is not on the ray's piece or does not show.
+    /// Returns the Gaussian's alpha at its densest point on the line of `ray`; `None` if this point is not on the segment
+    /// or the Gaussian does not show there.
     #[inline]
     fn alpha(&self, ray: &Ray) -> Option<f64> {
         let offset = self.centre - ray.origin;
@@ -110,7 +112,7 @@ impl Gaussian {
         if aside > self.reach * self.reach || along + self.reach < ray.from || along - self.reach > ray.to {
             return None;
         }
-        // From here on lengths are in standard deviations along its axes.
+        // From here on lengths are in standard deviations along the axes of the Gaussian.
         let to_axes = DMat3::from_quat(self.rotation).transpose();
         let (offset, direction) = (to_axes * offset / self.scales, to_axes * ray.direction / self.scales);
         let squares = direction.length_squared();

@@ -1,4 +1,4 @@
-//! Files that cameras are read from: a folder, or bytes in memory.
+//! Files from which cameras are read, in a folder or in memory.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Cursor, Read, Seek};
@@ -6,15 +6,15 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// Largest JSON file read, in bytes: 40 times that of the largest scene of Mip-NeRF 360.
+/// Largest JSON file read, in bytes: 40 times the size of the file of the largest scene of Mip-NeRF 360.
 pub const MAX_CAMERAS_BYTES: u64 = 16 << 20;
 
-/// The files of a folder that has cameras. Names of files below it have `/` between their parts.
+/// The files of a folder with cameras. Names of files in sub-folders have `/` between their parts.
 pub trait ViewFiles {
-    /// What the folder is called in errors.
+    /// Returns the name of the folder in errors.
     fn name(&self) -> String;
 
-    /// Whether there is a file called `file`.
+    /// Returns whether there is a file called `file`.
     fn has(&self, file: &str) -> bool;
 
     /// Opens `file`.
@@ -24,18 +24,18 @@ pub trait ViewFiles {
     fn open(&self, file: &str) -> Result<ViewFile<'_>>;
 }
 
-/// What an open file is read through.
+/// A reader of an open file.
 pub trait ReadSeek: BufRead + Seek {}
 
 impl<R: BufRead + Seek> ReadSeek for R {}
 
 /// An open file of [`ViewFiles`].
 pub struct ViewFile<'a> {
-    /// What the file is called in errors.
+    /// Name of the file in errors.
     pub name: String,
-    /// The bytes, from the first on.
+    /// Reader of the bytes, from the first byte on.
     pub reader: Box<dyn ReadSeek + 'a>,
-    /// The number of bytes.
+    /// Number of bytes.
     pub len: u64,
 }
 
@@ -46,13 +46,14 @@ impl std::fmt::Debug for ViewFile<'_> {
 }
 
 impl<'a> ViewFile<'a> {
-    /// A file called `name` whose bytes are in memory.
+    /// Returns a file called `name` whose bytes are in memory.
     #[must_use]
     pub fn from_bytes(name: String, bytes: &'a [u8]) -> Self {
         Self { name, reader: Box::new(Cursor::new(bytes)), len: bytes.len() as u64 }
     }
 
-    /// Reads all bytes, but for the mark of UTF-8. Of a file over [`MAX_CAMERAS_BYTES`] it reads one byte more than that.
+    /// Reads all bytes without a byte order mark of UTF-8. Of a file over [`MAX_CAMERAS_BYTES`] only one byte more than
+    /// the limit is read.
     pub(crate) fn read_limited(self) -> Result<(String, Vec<u8>)> {
         let mut bytes = Vec::new();
         let read = self.reader.take(MAX_CAMERAS_BYTES + 1).read_to_end(&mut bytes);
@@ -63,12 +64,12 @@ impl<'a> ViewFile<'a> {
     }
 }
 
-/// The name of `file` in the folder called `folder`.
+/// Returns the name of `file` in the folder called `folder`.
 pub(crate) fn within(folder: &str, file: &str) -> String {
     Path::new(folder).join(file).display().to_string()
 }
 
-/// Files in memory, by their names.
+/// Files in memory, by name.
 impl ViewFiles for BTreeMap<String, Vec<u8>> {
     fn name(&self) -> String {
         String::new()
@@ -84,7 +85,7 @@ impl ViewFiles for BTreeMap<String, Vec<u8>> {
     }
 }
 
-/// Files of a folder on disk. Only regular files inside of it are opened.
+/// Files of a folder on disk. Only regular files inside the folder are opened.
 #[cfg(not(target_family = "wasm"))]
 impl ViewFiles for Path {
     fn name(&self) -> String {
@@ -96,7 +97,7 @@ impl ViewFiles for Path {
     }
 
     fn open(&self, file: &str) -> Result<ViewFile<'_>> {
-        // A data set comes from anybody, and so do the links in it. Sizes are checked by the readers.
+        // A data set may come from anybody, and so may the links in it. The readers check the sizes of files.
         let found = lexisplat::file_inside(self, file, u64::MAX)?;
         let opened = open(&found)?;
         Ok(ViewFile { name: self.join(file).display().to_string(), ..opened })

@@ -1,33 +1,33 @@
-//! A set of cameras, with warnings about the files they were read from.
+//! A set of cameras, with warnings about their files.
 
 use lexisplat::Offset;
 
 use crate::camera::{Camera, single};
 
-/// A principal point farther than this from the picture's centre, in pixels on either axis, is worth a
-/// warning. Rounding a picture's size moves it by as much.
+/// Largest distance of a principal point from the centre of the picture without a warning, in pixels on either axis.
+/// Rounding the size of a picture moves the principal point by as much.
 const CENTRE_SLACK: f64 = 0.5;
 
-/// Cameras, and what is odd about their files.
+/// Cameras, and oddities of their files.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ViewSet {
-    /// The cameras; every one passes [`Camera::validate`].
+    /// The cameras. Every camera passes [`Camera::validate`].
     pub cameras: Vec<Camera>,
-    /// Where each camera is, before it was rounded.
+    /// Position of each camera before rounding.
     pub positions: Vec<[f64; 3]>,
-    /// What was ignored or looks wrong, one sentence each.
+    /// Values that were ignored or look wrong, one sentence each.
     pub warnings: Vec<String>,
 }
 
 impl ViewSet {
-    /// Cameras with their positions before rounding.
+    /// Returns a set of cameras with their positions before rounding.
     pub(crate) fn new(placed: Vec<(Camera, [f64; 3])>, warnings: Vec<String>) -> Self {
         let (cameras, positions) = placed.into_iter().unzip();
         Self { cameras, positions, warnings }
     }
 
-    /// The cameras for a scene whose positions are relative to `offset`, which is subtracted in double precision. Without
-    /// one nothing changes.
+    /// Returns the cameras for a scene whose positions are relative to `offset`. The offset is subtracted in double
+    /// precision. Without an offset nothing changes.
     #[must_use]
     pub fn relative_to(mut self, offset: Option<Offset>) -> Self {
         let Some(offset) = offset.map(Offset::get) else { return self };
@@ -39,11 +39,11 @@ impl ViewSet {
     }
 }
 
-/// Returns the width and height, in pixels, of the photo of a name; `None` if they are not known. It is asked
-/// only where the cameras' file does not say.
+/// Returns the width and height, in pixels, of the photo with the given name; `None` if they are not known. It is called
+/// only if the file of cameras does not state the size.
 pub type SizeOf<'a> = &'a mut dyn FnMut(&str) -> Option<(u32, u32)>;
 
-/// Counts the principal points that are off the centre, for one warning about all of them.
+/// Counts principal points that are off the centre, for one warning about all of them.
 #[derive(Debug, Default)]
 pub(crate) struct PrincipalPoints {
     off: usize,
@@ -51,7 +51,7 @@ pub(crate) struct PrincipalPoints {
 }
 
 impl PrincipalPoints {
-    /// Looks at the principal point `centre` of a picture of `width * height` pixels.
+    /// Examines the principal point `centre` of a picture of `width * height` pixels.
     pub(crate) fn see(&mut self, centre: [f64; 2], width: u32, height: u32) {
         let [x, y] = centre;
         let (x, y) = ((x - f64::from(width) / 2.0).abs(), (y - f64::from(height) / 2.0).abs());
@@ -62,7 +62,7 @@ impl PrincipalPoints {
         }
     }
 
-    /// The warning, if there is something to warn of.
+    /// Returns the warning, if there is a reason for one.
     pub(crate) fn warning(&self) -> Option<String> {
         (self.off > 0).then(|| {
             let cameras = if self.off == 1 { "camera" } else { "cameras" };

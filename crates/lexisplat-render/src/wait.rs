@@ -1,9 +1,9 @@
-//! Waiting for the GPU: callbacks as futures, and the loop that lets a thread block on a future.
+//! Waits for the GPU: callbacks as futures, and the loop by which a thread blocks on a future.
 
 #[cfg(not(target_family = "wasm"))]
 use crate::error::Result;
 
-/// Returns a callback and a future that gives what the callback was called with.
+/// Returns a callback, and a future that gives the value with which the callback was called.
 #[cfg(feature = "gpu")]
 pub(crate) fn answer<T: Send + 'static>() -> (impl FnOnce(T) + Send + 'static, impl Future<Output = T>) {
     use std::sync::{Arc, Mutex, PoisonError};

@@ -1,22 +1,22 @@
-//! SH coefficients of a colour that depends on the direction, by least squares.
+//! Fits SH coefficients to a colour that depends on the direction, by least squares.
 
 use crate::math::{GOLDEN_TURN, Vec3, dvec3, sin_cos_turns};
 use crate::random::Random;
 use lexisplat::ShDegree;
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, rest_basis};
 
-/// Number of directions that the colour is evaluated in.
+/// Number of directions in which the colour is evaluated.
 const DIRECTIONS: u32 = 144;
-/// SH coefficients of a channel at degree 3.
+/// Number of SH coefficients of a channel at degree 3.
 const COEFFICIENTS: usize = 16;
-/// SH-rest values of a Gaussian.
+/// Number of SH-rest values of a Gaussian.
 pub(crate) const REST: usize = CHANNELS * (COEFFICIENTS - 1);
 
-/// Directions, and the matrix from the values in them to coefficients.
+/// Directions, and the matrix from values in these directions to coefficients.
 #[derive(Debug)]
 pub(crate) struct Fit {
     directions: Vec<Vec3>,
-    /// The weight of each direction in each coefficient.
+    /// Weight of each direction in each coefficient.
     weights: Vec<[f64; COEFFICIENTS]>,
 }
 
@@ -87,13 +87,14 @@ fn pseudo_inverse(basis: &[[f64; COEFFICIENTS]]) -> Vec<[f64; COEFFICIENTS]> {
 
 /// Standard deviation of the noise of a typical Gaussian's coefficients.
 const NOISE: f64 = 0.033;
-/// Share of the noise's variance that all channels share; trained models have about 0.75.
+/// Share of the noise's variance that is common to all channels; trained models have about 0.75.
 const SHARED: f64 = 0.75;
 
-/// Adds noise like that of training: equally strong in all bands, mostly shared by the channels, and stronger on some
-/// Gaussians than on others. `amount` is a factor on it, usually 1.
+/// Adds noise like that of training. It is equally strong in all bands, mostly common to the channels, and stronger on
+/// some Gaussians than on others. `amount` is a factor on the noise, usually 1.
 pub(crate) fn add_training_noise(rest: &mut [f64; REST], amount: f64, random: &mut Random) {
-    // 0.6 to about 3, with a mean of 1.1. Gaussians that few training views see have the most noise.
+    // The factor `0.5 + 0.2 / (1.08 - u)` is 0.7 to 3, with a mean of 1.0. Gaussians that few training views see have the
+    // most noise.
     let u = random.uniform();
     let strength = amount * NOISE * (0.5 + 0.2 / (1.08 - u));
     let (common, own) = (SHARED.sqrt(), (1.0 - SHARED).sqrt());

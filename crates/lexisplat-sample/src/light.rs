@@ -5,13 +5,14 @@ use crate::math::{Vec3, dvec3, frame, mix, smoothstep, spiral};
 use crate::random::Random;
 use crate::shapes::{UP, block_axes, reflect};
 
-/// Rays from a surface to each lamp. More rays make softer shadows.
+/// Number of rays from a surface to each lamp. More rays make softer shadows.
 const SHADOW_RAYS: usize = 12;
-/// Rays from a surface that gather indirect light.
+/// Number of rays from a surface that gather indirect light.
 const GATHER_RAYS: usize = 32;
-/// Distance of the start of rays from the surface, in world units: more than the gaps between beads and surface.
+/// Distance between the start of rays and the surface, in world units. It is more than the gaps between beads and
+/// surface.
 const LIFT: f64 = 0.012;
-/// Surfaces of this roughness or more reflect only the studio, not other objects.
+/// Smallest roughness of surfaces that reflect only the studio, not other objects.
 const TRACED_ROUGHNESS: f64 = 0.5;
 /// Factor on light before the tone curve.
 const EXPOSURE: f64 = 0.45;
@@ -26,7 +27,7 @@ struct Lamp {
     /// Direction to the lamp, of unit length.
     to: Vec3,
     colour: Vec3,
-    /// `1 - cos` of half of the angle that it covers.
+    /// `1 - cos` of half the angle that the lamp covers.
     width: f64,
 }
 
@@ -37,7 +38,7 @@ pub(crate) enum Body {
         centre: Vec3,
         radius: f64,
     },
-    /// Balls of one radius within `bound` of the centre.
+    /// Balls of the same radius, all within `bound` of the centre.
     Beads {
         centre: Vec3,
         bound: f64,
@@ -71,9 +72,9 @@ pub(crate) struct Lit<'a> {
     surface: Surface,
     /// The diffuse light that leaves the point.
     diffuse: Vec3,
-    /// The visible share of each lamp.
+    /// Visible share of each lamp.
     seen: [f64; 4],
-    /// The share of the wall that is visible.
+    /// Visible share of the wall.
     open: f64,
 }
 
@@ -95,19 +96,19 @@ impl Studio {
         }
     }
 
-    /// Returns the light of the studio's wall in `direction`: the colours of dusk, by height.
+    /// Returns the light of the studio's wall in `direction`: colours of dusk that depend on the height.
     pub(crate) fn wall(direction: Vec3) -> Vec3 {
         let height = direction.dot(UP);
         let low = mix(dvec3(0.012, 0.022, 0.045), dvec3(0.10, 0.15, 0.22), smoothstep(-0.9, -0.05, height));
         let high = mix(low, dvec3(0.52, 0.40, 0.34), smoothstep(-0.25, 0.18, height));
         let top = mix(high, dvec3(0.09, 0.17, 0.34), smoothstep(0.1, 0.75, height));
-        // One side is warmer, so that a turn of the camera shows.
+        // One side is warmer, so that a turn of the camera is visible.
         let warm = smoothstep(-0.4, 1.0, direction.x * 0.8 - direction.z * 0.6);
         top * mix(dvec3(0.8, 0.95, 1.15), dvec3(1.25, 1.0, 0.85), warm)
     }
 
-    /// Returns the light of lamps and wall from `direction`, blurred by `roughness`. `seen` and `open` are the visible
-    /// shares.
+    /// Returns the light of the lamps and the wall from `direction`, blurred by `roughness`. `seen` and `open` are the
+    /// visible shares of the lamps and of the wall.
     fn surroundings(&self, direction: Vec3, roughness: f64, seen: &[f64; 4], open: f64) -> Vec3 {
         let spread = roughness * roughness;
         let mut light = Self::wall(direction) * open;
@@ -139,7 +140,7 @@ impl Studio {
         self.bodies.iter().any(|(body, _)| body.hit(origin, direction).is_some())
     }
 
-    /// Estimates the diffuse light that leaves a surface, as if nothing blocked the lamps and the wall.
+    /// Estimates the diffuse light that leaves a surface if nothing blocks the lamps and the wall.
     fn rough_guess(&self, normal: Vec3, albedo: Vec3) -> Vec3 {
         let mut light = Self::wall(normal) * 0.5;
         for lamp in &self.lamps {
@@ -251,7 +252,7 @@ impl Body {
                 let to = *centre - origin;
                 let along = to.dot(direction);
                 let apart = to.dot(to) - bound * bound;
-                // The ray starts outside of the bound and does not enter it.
+                // The ray starts outside of the bound and does not enter the bound.
                 if apart > 0.0 && (along < 0.0 || to.dot(to) - along * along > bound * bound) {
                     return None;
                 }

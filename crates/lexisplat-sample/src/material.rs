@@ -4,7 +4,7 @@ use crate::math::{Vec3, dvec3, mix, sin_cos_turns, smoothstep};
 use crate::random::value_noise;
 use crate::shapes::Edge;
 
-/// Reflectance at normal incidence of everything that is not a metal.
+/// Reflectance at normal incidence of all materials that are not metals.
 const DIELECTRIC: f64 = 0.04;
 /// Side of the squares of the table top, in world units.
 const SQUARE: f64 = 0.25;
@@ -25,11 +25,11 @@ pub(crate) enum Material {
     Chequered,
     /// Lacquered dark wood.
     DarkWood,
-    /// One colour under a clear coat; roughness 0 to 1.
+    /// A single colour under a clear coat, with roughness from 0 to 1.
     Paint { colour: Vec3, roughness: f64 },
-    /// One colour with fine grain and without gloss.
+    /// A single colour with fine grain and without gloss.
     Clay { colour: Vec3 },
-    /// Reflection with this colour.
+    /// A metal that reflects with this colour.
     Metal { colour: Vec3, roughness: f64 },
     /// White stone with grey veins.
     Marble,
@@ -48,7 +48,7 @@ pub(crate) struct Surface {
     pub(crate) albedo: Vec3,
     /// Mirror reflectance at normal incidence, linear.
     pub(crate) mirror: Vec3,
-    /// 0 is a mirror, 1 is matt.
+    /// Roughness: 0 is a mirror, 1 is matt.
     pub(crate) roughness: f64,
 }
 
@@ -94,7 +94,7 @@ impl Material {
         }
     }
 
-    /// Returns the nearest line of the pattern at `local`, if it has lines.
+    /// Returns the nearest line of the pattern at `local`; `None` if the pattern has no lines.
     pub(crate) fn edge(&self, local: Vec3) -> Option<Edge> {
         if !matches!(self, Self::Chequered) {
             return None;

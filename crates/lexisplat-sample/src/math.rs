@@ -1,13 +1,14 @@
 //! Vectors of three numbers, and the transcendental functions that the scene needs.
 //!
-//! The last bit of `f64::sin`, `cos` and `ln` depends on the platform's library. The functions here use only operations
-//! that IEEE 754 rounds exactly, as `glam` does for vectors of `f64`, so that the scene is the same everywhere.
+//! The last bit of `f64::sin`, `cos` and `ln` depends on the platform's library. The functions of this module use only
+//! operations that IEEE 754 rounds exactly, as does `glam` for vectors of `f64`. The scene is therefore the same
+//! everywhere.
 
 /// A point or direction in world units, or a colour.
 pub(crate) use glam::DVec3 as Vec3;
 pub(crate) use glam::dvec3;
 
-/// Terms of each Taylor series; the last one is below 1e-17 on the reduced range.
+/// Number of terms of each Taylor series. The last term is below 1e-17 on the reduced range.
 const TERMS: u32 = 10;
 /// The golden angle in turns. Its multiples spread directions evenly.
 pub(crate) const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
@@ -40,8 +41,8 @@ pub(crate) fn frame(n: Vec3) -> (Vec3, Vec3) {
     (side, n.cross(side))
 }
 
-/// Returns `count` points of a spiral that starts at the angle `turn`: the share of the points so far, 0 to 1, and sine
-/// and cosine of the angle. With the share's root as radius they cover a disc evenly.
+/// Returns `count` points of a spiral that starts at the angle `turn`: for each the share of the points so far, 0 to 1,
+/// and the sine and cosine of the angle. With the square root of the share as the radius the points cover a disc evenly.
 pub(crate) fn spiral(turn: f64, count: usize) -> impl Iterator<Item = (f64, f64, f64)> {
     (0..count).map(move |k| {
         let (sin, cos) = sin_cos_turns(turn + k as f64 * GOLDEN_TURN);
@@ -51,7 +52,7 @@ pub(crate) fn spiral(turn: f64, count: usize) -> impl Iterator<Item = (f64, f64,
 
 /// Returns sine and cosine of `turns` full turns, with an error below 1e-15.
 pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
-    // The rest after the nearest quarter turn is at most an eighth of a turn.
+    // The remainder after the nearest quarter turn is at most an eighth of a turn.
     let quarters = (turns * 4.0).round();
     let x = (turns - quarters / 4.0) * std::f64::consts::TAU;
     let (mut sin, mut cos) = (0.0, 0.0);
@@ -82,7 +83,7 @@ pub(crate) fn ln(x: f64) -> f64 {
         mantissa *= 2.0;
         exponent -= 1.0;
     }
-    // ln m = 2 artanh((m - 1) / (m + 1)); the argument is at most 0.172.
+    // `ln m = 2 artanh((m - 1) / (m + 1))`. The argument of artanh is at most 0.172.
     let t = (mantissa - 1.0) / (mantissa + 1.0);
     let mut sum = 0.0;
     let mut power = t;

@@ -1,17 +1,17 @@
-//! Seeded random numbers. Each Gaussian has a stream of its own, so that they do not depend on threads.
+//! Seeded random numbers. Each Gaussian has a stream of its own, so that the numbers do not depend on threads.
 
 use crate::math::Vec3;
 
 /// Step of the `SplitMix64` state (Steele, Lea, Flood 2014): 2^64 over the golden ratio.
 const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
-/// Number of uniform numbers that add up to a nearly normal one of variance 1.
+/// Number of uniform random numbers whose sum is a nearly normal random number of variance 1.
 const UNIFORMS: u32 = 12;
 
 /// A `SplitMix64` stream.
 #[derive(Debug, Clone)]
 pub(crate) struct Random(u64);
 
-/// The output function of `SplitMix64`.
+/// Returns the output of `SplitMix64` for the state `z`.
 fn scramble(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -46,7 +46,7 @@ impl Random {
     }
 }
 
-/// Returns smooth noise in \[0, 1) with features of unit size, which interpolates random values on the integer lattice.
+/// Returns smooth noise in \[0, 1) with features of unit size. It interpolates random values on the integer lattice.
 pub(crate) fn value_noise(p: Vec3) -> f64 {
     let cell = p.floor();
     let blend: [f64; 3] = std::array::from_fn(|i| {

@@ -1,4 +1,4 @@
-//! Making the scene's Gaussians.
+//! Makes the Gaussians of the scene.
 
 use lexisplat::sh::CHANNELS;
 use lexisplat::{Geometry, SceneMeta, ShDegree, Splats};
@@ -12,14 +12,14 @@ use crate::random::Random;
 use crate::shapes::{self, Edge, quaternion};
 use crate::still_life::{self, Thing};
 
-/// Gaussians of the default scene.
+/// Number of Gaussians of the default scene.
 pub const DEFAULT_GAUSSIANS: usize = 60_000;
-/// Standard deviation along the surface, in units of the mean distance between neighbours. Smaller values leave holes
-/// in the surface, larger ones blur it.
+/// Standard deviation along the surface, in units of the mean distance between neighbours. Smaller values leave holes in
+/// the surface, and larger values blur it.
 const SPREAD: f64 = 0.60;
-/// Standard deviation across the surface, in units of that along it.
+/// Standard deviation across the surface, in units of the standard deviation along it.
 const THICKNESS: f64 = 0.12;
-/// Largest stretch: one axis is multiplied by 1 plus this, the other divided.
+/// Largest stretch. One axis is multiplied by 1 plus the stretch, and the other is divided by it.
 const STRETCH: f64 = 0.35;
 /// Smallest distance between a Gaussian's centre and an edge of the surface or of its pattern, in standard deviations.
 const REACH: f64 = 1.3;
@@ -27,9 +27,10 @@ const REACH: f64 = 1.3;
 const MIN_SHORT: f64 = 0.2;
 /// Largest random offset of centres along each axis, in units of the distance between neighbours.
 const STRAY: f64 = 0.12;
-/// Standard deviation of the tilt of normals, as a tangent. Training does not find normals exactly.
+/// Standard deviation of the tilt of normals, as a tangent. The tilt is there because training does not find normals
+/// exactly.
 const TILT: f64 = 0.03;
-/// Factor on the noise of the wall. Training sees it from few directions and learns those well.
+/// Factor on the noise of the wall. Training sees the wall from few directions and learns those well.
 const WALL_NOISE: f64 = 0.5;
 /// Largest relative variation of roughness between Gaussians.
 const UNEVEN: f64 = 0.35;
@@ -38,9 +39,9 @@ const UNEVEN: f64 = 0.35;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SampleOptions {
-    /// Number of Gaussians. Default [`DEFAULT_GAUSSIANS`].
+    /// Number of Gaussians. The default is [`DEFAULT_GAUSSIANS`].
     pub gaussians: usize,
-    /// Seed of all random numbers. Default 0.
+    /// Seed of all random numbers. The default is 0.
     pub seed: u64,
 }
 
@@ -58,7 +59,7 @@ impl SampleOptions {
     }
 }
 
-/// One finished Gaussian.
+/// A finished Gaussian.
 struct Gaussian {
     position: [f32; 3],
     dc: [f32; CHANNELS],
@@ -101,7 +102,7 @@ pub fn scene(options: &SampleOptions) -> Splats {
     }
 }
 
-/// Returns the number of Gaussians of each thing; they sum to `total`.
+/// Returns the number of Gaussians of each thing. The sum of the numbers is `total`.
 fn shares(things: &[Thing], total: usize) -> Vec<usize> {
     let weights: Vec<f64> = things.iter().map(|t| t.shape.area() * t.density).collect();
     let sum: f64 = weights.iter().sum();
@@ -166,7 +167,7 @@ fn gaussian(
     let (mut long, mut short) = (spread * stretch, spread / stretch);
     let edge = Edge::nearer(point.edge, thing.material.edge(point.local));
     if let Some(edge) = edge.filter(|edge| edge.distance < REACH * short) {
-        // Gaussians at an edge are long along it and short across it, as training makes them.
+        // Gaussians at an edge are long along the edge and short across it, as after training.
         x = edge.along;
         long = spread * (1.0 + STRETCH);
         short = (edge.distance / REACH).max(spread * MIN_SHORT);
@@ -184,7 +185,7 @@ fn gaussian(
     }
 }
 
-/// Returns an opacity: mostly near 1, sometimes well below, as in trained models.
+/// Returns an opacity. It is mostly near 1, and sometimes well below, as in trained models.
 fn opacity(random: &mut Random) -> f64 {
     let u = random.uniform();
     let solid = 0.90 + 0.095 * random.uniform();

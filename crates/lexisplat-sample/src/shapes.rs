@@ -1,25 +1,25 @@
-//! Surfaces, and points that cover them evenly.
+//! Surfaces, and points that cover surfaces evenly.
 
 use crate::math::{Vec3, any_tangent, dvec3, sin_cos_turns, tangent};
 
 /// Up in the world: y points down, as in scenes trained from COLMAP's cameras.
 pub(crate) const UP: Vec3 = Vec3::NEG_Y;
-/// The fractional part of the golden ratio. Its multiples fill the unit interval most evenly, and a lattice made with
-/// them stays even if it is stretched.
+/// The fractional part of the golden ratio. Its multiples fill the unit interval most evenly, and a lattice made of them
+/// stays even if it is stretched.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
-/// Newton steps for points of a torus tube; fewer would do.
+/// Number of Newton steps for points of a torus tube. Fewer steps would be enough.
 const NEWTON: usize = 8;
-/// Number of straight pieces that the knot's curve is measured with.
+/// Number of straight pieces by which the length of the knot's curve is measured.
 const KNOT_PIECES: u32 = 512;
 
 /// A surface in world units.
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
-    /// A sphere. Its normals point to the centre if it is `inward`.
+    /// A sphere. Its normals point to the centre if `inward` is set.
     Sphere { centre: Vec3, radius: f64, inward: bool },
     /// A level disc that faces up.
     Disc { centre: Vec3, radius: f64 },
-    /// The side of a level disc of some thickness; `centre` is that of its upper face.
+    /// The side of a level disc of some thickness. `centre` is the centre of its upper face.
     Rim { centre: Vec3, radius: f64, thickness: f64 },
     /// A level torus.
     Torus { centre: Vec3, ring: f64, tube: f64 },
@@ -34,20 +34,20 @@ pub(crate) enum Shape {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Point {
     pub(crate) position: Vec3,
-    /// Outward, unit length.
+    /// Outward normal, of unit length.
     pub(crate) normal: Vec3,
-    /// Along the surface, unit length.
+    /// Tangent along the surface, of unit length.
     pub(crate) tangent: Vec3,
-    /// Position relative to the shape, in the axes of a block; patterns depend on it.
+    /// Position relative to the shape, in the axes of a block. Patterns depend on it.
     pub(crate) local: Vec3,
     /// The nearest edge of the surface, if it has edges.
     pub(crate) edge: Option<Edge>,
 }
 
-/// A line that Gaussians should not reach across.
+/// A line across which Gaussians should not reach.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Edge {
-    /// Distance of the line, in world units.
+    /// Distance of the point from the line, in world units.
     pub(crate) distance: f64,
     /// Unit vector along the line.
     pub(crate) along: Vec3,
@@ -170,7 +170,7 @@ struct Face {
     area: f64,
 }
 
-/// Returns the axes of a block with this direction to the right.
+/// Returns the axes of a block whose right axis is `right`.
 pub(crate) fn block_axes(right: Vec3) -> [Vec3; 3] {
     [right, UP, right.cross(UP)]
 }
@@ -183,8 +183,8 @@ fn faces(half: Vec3) -> [Face; 5] {
     })
 }
 
-/// Returns the angle around the tube of a torus, in turns from the outside, up to which the share `v` of its area lies.
-/// `ratio` is the radius of the tube over that of the ring. Solves `t + ratio sin(2 pi t) / 2 pi = v`.
+/// Returns the angle around the tube of a torus, in turns from the outside, up to which the share `v` of the tube's area
+/// lies. `ratio` is the radius of the tube over the radius of the ring. Solves `t + ratio sin(2 pi t) / 2 pi = v`.
 fn even_round_tube(v: f64, ratio: f64) -> f64 {
     let mut t = v;
     for _ in 0..NEWTON {
@@ -198,7 +198,7 @@ fn even_round_tube(v: f64, ratio: f64) -> f64 {
 fn knot(t: f64, size: f64) -> (Vec3, Vec3, Vec3) {
     let (sin2, cos2) = sin_cos_turns(2.0 * t);
     let (sin3, cos3) = sin_cos_turns(3.0 * t);
-    // The knot is upright: x to the right, y vertical, z to the viewer.
+    // The knot is upright: x points to the right, y is vertical, and z points to the viewer.
     let point = dvec3((2.0 + cos3) * cos2, (2.0 + cos3) * sin2, sin3);
     let along = dvec3(
         -3.0 * sin3 * cos2 - 2.0 * (2.0 + cos3) * sin2,

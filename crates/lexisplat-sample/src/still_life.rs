@@ -7,7 +7,7 @@ use crate::shapes::{Shape, knot_beads, torus_beads};
 
 /// Radius of the table.
 const TABLE: f64 = 1.7;
-/// Radius of the studio's wall. Cameras that show the whole table are well inside of it.
+/// Radius of the studio's wall. Cameras that show the whole table are well inside the wall.
 const WALL: f64 = 12.0;
 /// Number of balls that block light in place of a torus or a knot.
 const BEADS: usize = 48;
@@ -17,7 +17,7 @@ const BEADS: usize = 48;
 pub(crate) struct Thing {
     pub(crate) shape: Shape,
     pub(crate) material: Material,
-    /// Gaussians per area, in units of those of the table. Fine patterns need more.
+    /// Number of Gaussians per area, relative to that of the table. Fine patterns need more.
     pub(crate) density: f64,
 }
 

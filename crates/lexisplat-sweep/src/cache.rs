@@ -9,11 +9,11 @@ use lexisplat::output::{self, Output, OutputGroup};
 use lexisplat_compress::{Error, Result};
 use lexisplat_eval::format::file_name;
 
-/// Version of the format. Parts of other versions are made again.
+/// Version of the format of stored parts. Parts of other versions are made again.
 const VERSION: u32 = 1;
-/// Largest part in bytes: ten thousand views.
+/// Largest size of a part, in bytes: ten thousand views.
 const MAX_BYTES: u64 = 16 << 20;
-/// FNV-1a's offset basis and prime, for 64 bits (Fowler, Noll, Vo).
+/// Offset basis and prime of FNV-1a, for 64 bits (Fowler, Noll, Vo).
 const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
 const FNV_PRIME: u64 = 0x0100_0000_01b3;
 
@@ -40,21 +40,22 @@ impl Cache {
         Ok(Self { folder, reuse, outputs: outputs.clone() })
     }
 
-    /// The part `name` made from exactly what `key` describes, if it is stored and whole.
+    /// Returns the stored part `name` that was made from exactly the values in `key`; `None` if it does not exist or is
+    /// damaged.
     pub(super) fn find<T: DeserializeOwned>(&self, name: &str, key: &str) -> Option<T> {
         let path = self.path(name, key);
         if !self.reuse || std::fs::metadata(&path).ok()?.len() > MAX_BYTES {
             return None;
         }
         let stored: Stored<String, T> = serde_json::from_slice(&std::fs::read(&path).ok()?).ok()?;
-        // The file name has a hash of the key. Comparing the key itself excludes collisions.
+        // The file name has a hash of the key. The comparison of the key itself excludes collisions.
         (stored.version == VERSION && stored.key == key).then_some(stored.value)
     }
 
     /// Stores a part.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// An error if the part cannot be written.
     pub(super) fn store<T: Serialize>(&self, name: &str, key: &str, value: &T) -> Result<()> {
         let path = self.path(name, key);
         let stored = Stored { version: VERSION, key, value };
@@ -67,7 +68,7 @@ impl Cache {
     }
 }
 
-/// Writes `bytes` to `path` completely, or not at all. The file is one of `outputs`.
+/// Writes `bytes` to `path`, completely or not at all. The file is a member of `outputs`.
 pub(super) fn write_whole(outputs: &OutputGroup, path: &Path, bytes: &[u8]) -> Result<()> {
     Ok(output::write_whole(Output::from(path).within(outputs), |writer| {
         std::io::Write::write_all(writer, bytes).map_err(|e| lexisplat::Error::io(path, e))

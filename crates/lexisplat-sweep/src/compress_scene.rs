@@ -1,4 +1,4 @@
-//! One model compressed in one way.
+//! Compresses one model in one way.
 
 use std::sync::Arc;
 
@@ -10,7 +10,8 @@ use lexisplat_render::Renderer;
 use super::options::SweepOptions;
 use super::results::Setting;
 
-/// Compresses `splats`. The model is looked at for its first packed file, and `looked` is reused for the others.
+/// Compresses `splats`. The views and the sensitivity of the model are measured for its first packed file. `looked` keeps
+/// them for the other files.
 pub(super) fn compress_scene(
     splats: &Splats,
     setting: Setting,
@@ -30,7 +31,7 @@ pub(super) fn compress_scene(
         Setting::MaxNonzeros(most) => {
             Compression::Exact(exact.with_tolerance(None).with_max_nonzeros(most), codes)
         }
-        // As `lexisplat compress --preset` does without cameras.
+        // The result is that of `lexisplat compress --preset` without cameras.
         Setting::Preset(preset) => {
             let looked = match looked {
                 Some(looked) => looked,

@@ -1,4 +1,4 @@
-//! Means at each setting: the points of lines in figures.
+//! Means at each setting, which are the points of lines in figures.
 
 use lexisplat_eval::{FrameRate, Summary};
 
@@ -6,17 +6,18 @@ use super::grid::Grid;
 use super::measure::{Measure, mean};
 use super::{Fps, Method, Point, SceneResult, Setting};
 
-/// Models of one method at one setting: those of all scenes, or that of one.
+/// The models of one method at one setting: those of all scenes, or that of one scene.
 #[derive(Debug, Clone)]
 pub(super) struct At<'a> {
     pub(super) setting: Setting,
     models: Vec<(&'a SceneResult, &'a Point)>,
-    /// Whether there is one scene, whose quality is told over its views.
+    /// Whether there is only one scene. Its quality is then summarised over its views.
     one_scene: bool,
 }
 
 impl At<'_> {
-    /// PSNR against the original in dB, over scenes or over the views of one. All `None` if pictures are identical.
+    /// Returns PSNR against the original, in dB, over scenes or over the views of a single scene. All values are `None`
+    /// if the pictures are identical.
     pub(super) fn psnr(&self) -> Summary {
         match self.models.as_slice() {
             [(_, point)] if self.one_scene => point.to_original.psnr,
@@ -24,25 +25,25 @@ impl At<'_> {
         }
     }
 
-    /// The mean of a measure over the scenes that have it.
+    /// Returns the mean of a measure over the scenes that have it.
     pub(super) fn mean(&self, measure: Measure) -> Option<f64> {
         mean(self.models.iter().filter_map(|(scene, point)| measure.value(scene, Some(point))))
     }
 
-    /// The mean of the slowest and of the fastest rounds of a rate over the scenes that have it.
+    /// Returns the mean of the slowest rounds and the mean of the fastest rounds of a rate, over the scenes that have it.
     pub(super) fn rounds(&self, rate: fn(&Fps) -> FrameRate) -> Option<(f64, f64)> {
         let rates: Vec<FrameRate> =
             self.models.iter().filter_map(|(_, point)| point.fps.as_ref().map(rate)).collect();
         Some((mean(rates.iter().map(|rate| rate.least))?, mean(rates.iter().map(|rate| rate.most))?))
     }
 
-    /// The paper's ratio. `None` where nothing is coded.
+    /// Returns the paper's ratio; `None` if nothing is coded.
     pub(super) fn ratio(&self) -> Option<f64> {
         self.mean(Measure::CoefficientRatio)
     }
 }
 
-/// Kinds of settings. Each makes a line.
+/// Kinds of settings. Each kind makes a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Tolerances,
@@ -62,7 +63,8 @@ impl Kind {
     }
 }
 
-/// The settings of a kind, closest to the original first. Over all scenes, or for that of one column.
+/// Returns the settings of a kind, in ascending distance from the original, over all scenes or for the scene of one
+/// column.
 pub(super) fn curve<'a>(grid: &Grid<'a>, method: Method, kind: Kind, column: Option<usize>) -> Vec<At<'a>> {
     let scenes = grid.models(method, column);
     let of_setting = |&setting: &Setting| {

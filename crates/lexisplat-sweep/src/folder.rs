@@ -1,4 +1,4 @@
-//! The folder that a sweep leaves behind.
+//! The output folder of a sweep.
 
 use std::path::{Path, PathBuf};
 
@@ -12,15 +12,16 @@ use super::{PictureFiles, Results, Setting, paper, tables};
 use lexisplat::output::OutputGroup;
 use lexisplat_compress::{Error, Result};
 
-/// Most bytes of pictures on the page; browsers grow slow with more. All pictures stay in their folder.
+/// Largest number of bytes of pictures on the page, because browsers become slow with more. All pictures stay in their
+/// folder.
 const PICTURE_BYTES: usize = 24 << 20;
 
-/// Writes everything that follows from `results` into `folder`: `report.html`, `all.csv`, `tables/`, `figures/`, and
-/// `survey/` if there were photos. `pictures` are those to show. `date` is printed as it is. The files are members of
-/// `outputs`. Returns their paths.
+/// Writes all outputs of `results` into `folder`: `report.html`, `all.csv`, `tables/`, `figures/`, and `survey/` if there
+/// were photos. `pictures` are the pictures that the page may show. `date` is printed as it is. The files are members of
+/// `outputs`. Returns the paths of the files.
 ///
 /// # Errors
-/// If a picture cannot be read, or a file cannot be written.
+/// An error if a picture cannot be read, or a file cannot be written.
 pub fn write_report(
     folder: &Path,
     results: &Results,
@@ -49,8 +50,8 @@ pub fn write_report(
     texts.chain(charts).map(write).collect()
 }
 
-/// The pictures that fit into a page, in the order of scenes and settings. Those of the paper's main tolerance
-/// are taken before others.
+/// Returns the pictures that fit into a page, in the order of scenes and settings. Pictures of the paper's main tolerance
+/// are chosen before others.
 fn shown(files: &[PictureFiles]) -> Result<Vec<(&PictureFiles, Vec<Part>)>> {
     let first = Setting::Tolerance(paper::TOLERANCE).label();
     let mut order: Vec<usize> = (0..files.len()).collect();

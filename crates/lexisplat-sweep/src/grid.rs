@@ -1,4 +1,4 @@
-//! Results as a grid: methods, scenes and settings in order.
+//! The results as a grid: methods, scenes and settings in order.
 
 use lexisplat_eval::metrics::Metric;
 
@@ -7,17 +7,17 @@ use super::{Method, Results, SceneResult, Setting, paper, unique};
 
 /// The methods, scenes and settings of a sweep, in the order of tables.
 pub(super) struct Grid<'a> {
-    /// Headings of scenes, in the manifest's order. Each scene is a column of the grid.
+    /// Headings of scenes, in the order of the manifest. Each scene is a column of the grid.
     pub(super) headings: Vec<String>,
-    /// Methods that have a model, in the paper's order.
+    /// Methods that have a model, in the order of the paper.
     pub(super) methods: Vec<Method>,
-    /// Settings that have a point: tolerances from small to large, then caps from many to few nonzeros, then presets
+    /// Settings that have a point: tolerances in ascending order, then caps on nonzeros in descending order, then presets
     /// from large to small files.
     pub(super) settings: Vec<Setting>,
     cells: Vec<(usize, &'a SceneResult)>,
 }
 
-/// A key that sorts settings by kind, then from close to the original to far from it.
+/// Returns a sort key for settings: by kind, then from near the original to far from it.
 fn order(setting: Setting) -> (u8, f64) {
     match setting {
         Setting::Tolerance(tolerance) => (0, tolerance),
@@ -26,7 +26,8 @@ fn order(setting: Setting) -> (u8, f64) {
     }
 }
 
-/// Whether two results are of one scene: the same name, and data sets that do not contradict each other.
+/// Returns whether two results are of the same scene: their names are equal, and their data sets do not contradict each
+/// other.
 fn same_scene(a: &SceneResult, b: &SceneResult) -> bool {
     a.name.to_lowercase() == b.name.to_lowercase()
         && (a.dataset.is_empty()
@@ -36,7 +37,7 @@ fn same_scene(a: &SceneResult, b: &SceneResult) -> bool {
 
 impl<'a> Grid<'a> {
     pub(super) fn new(results: &'a Results) -> Self {
-        // The first scene of a column names it. A column has at most one scene of each method.
+        // The first scene of a column gives it its name. A column has at most one scene of each method.
         let mut first: Vec<&SceneResult> = Vec::new();
         let mut cells: Vec<(usize, &SceneResult)> = Vec::new();
         for scene in &results.scenes {
@@ -72,18 +73,18 @@ impl<'a> Grid<'a> {
         Self { headings, methods, settings, cells }
     }
 
-    /// The model of a method in a column.
+    /// Returns the model of a method in a column.
     pub(super) fn scene(&self, method: Method, column: usize) -> Option<&'a SceneResult> {
         self.cells.iter().find(|(k, scene)| *k == column && scene.method == method).map(|(_, scene)| *scene)
     }
 
-    /// All models of a method, or that in one column.
+    /// Returns all models of a method, or its model in one column.
     pub(super) fn models(&self, method: Method, column: Option<usize>) -> Vec<&'a SceneResult> {
         let columns = column.map_or(0..self.headings.len(), |column| column..column + 1);
         columns.filter_map(|column| self.scene(method, column)).collect()
     }
 
-    /// Models column by column with their heading, methods in order within a column.
+    /// Returns the models column by column, each with its heading. Within a column they are in the order of methods.
     pub(super) fn scenes(&self) -> impl Iterator<Item = (&str, &'a SceneResult)> {
         self.headings.iter().enumerate().flat_map(move |(column, heading)| {
             self.methods
@@ -92,7 +93,7 @@ impl<'a> Grid<'a> {
         })
     }
 
-    /// The tolerance that is nearest to the paper's main one.
+    /// Returns the tolerance nearest to the paper's main tolerance.
     pub(super) fn main_setting(&self) -> Option<Setting> {
         let apart = |setting: &Setting| match setting {
             Setting::Tolerance(tolerance) => Some((tolerance - paper::TOLERANCE).abs()),
@@ -102,7 +103,7 @@ impl<'a> Grid<'a> {
         tolerances.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(setting, _)| setting)
     }
 
-    /// The scores of one kind that any model has, in the order of tables.
+    /// Returns the scores of one kind that at least one model has, in the order of tables.
     pub(super) fn scores(&self, kind: fn(Metric) -> Measure) -> Vec<Measure> {
         let is_of = |measure: &Measure, scene: &SceneResult| {
             let mut points = scene.points.iter().map(Some).chain([None]);
@@ -112,8 +113,8 @@ impl<'a> Grid<'a> {
         Metric::ALL.into_iter().map(kind).filter(any).collect()
     }
 
-    /// The device that FPS were measured on, for headings: `CPU`, a GPU's name, or `several devices`. Empty if
-    /// none were measured.
+    /// Returns the device on which frame rates were measured, for headings: `CPU`, the name of a GPU, or
+    /// `several devices`. The text is empty if no frame rates were measured.
     pub(super) fn device(&self) -> &'a str {
         let timed =
             self.cells.iter().filter(|(_, scene)| scene.points.iter().any(|point| point.fps.is_some()));

@@ -1,4 +1,24 @@
-//! Evaluation of many models at many settings, as the paper has it: compressed, drawn, scored and tabulated.
+//! Evaluates many models at many settings, as the paper does: compresses, draws, scores and tabulates them.
+//!
+//! A manifest lists the models:
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! let text = r#"
+//!     [[scene]]
+//!     dataset = "Mip-NeRF 360"
+//!     name = "bonsai"
+//!     method = "3dgs"
+//!     model = "3dgs/bonsai/point_cloud.ply"
+//! "#;
+//! let entries = lexisplat_sweep::parse_manifest(Path::new("scenes.toml"), text, Path::new("models"))?;
+//! assert_eq!(entries[0].model, Path::new("models/3dgs/bonsai/point_cloud.ply"));
+//! # Ok::<(), lexisplat_compress::Error>(())
+//! ```
+//!
+//! Start with [`sweep`](fn@sweep), which evaluates such entries and returns [`Results`], and with [`write_report`], which writes
+//! the tables, figures and the page of [`Results`]. docs/EVALUATION.md describes manifests and outputs.
 
 mod cache;
 mod compress_scene;
@@ -36,7 +56,7 @@ use lexisplat_eval::format::csv_cell;
 
 use figures::Figure;
 
-/// `name`, or the first of `name-2`, `name-3` and so on that is not `taken`.
+/// Returns `name`, or the first of `name-2`, `name-3` and so on that is not `taken`.
 fn unique(name: &str, taken: impl Fn(&str) -> bool) -> String {
     let mut unique = name.to_owned();
     let mut copy = 2;
@@ -47,7 +67,8 @@ fn unique(name: &str, taken: impl Fn(&str) -> bool) -> String {
     unique
 }
 
-/// Records as CSV (RFC 4180, lines end with a line feed). Text that a spreadsheet would take for a formula begins with `'`.
+/// Returns records as CSV (RFC 4180, with line feeds). A text that a spreadsheet would take for a formula gets a `'`
+/// before it.
 fn csv_text(records: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
     for record in records {

@@ -1,4 +1,4 @@
-//! Everything a sweep measured as one long CSV, for other programs.
+//! All measurements of a sweep as one long CSV, for other programs.
 
 use lexisplat_eval::Comparison;
 use lexisplat_eval::metrics::Metric;
@@ -8,12 +8,14 @@ use super::{Results, csv_text};
 /// Columns of [`long_csv`].
 const HEADER: [&str; 8] = ["dataset", "scene", "method", "setting", "against", "view", "metric", "value"];
 
-/// Where a number belongs, its name, and the number: the last four columns.
+/// The last four columns: what the number is against, its view, its name, and the number.
 type Value = [String; 4];
 
-/// One number on each line. `setting` is `original` for the model itself. `against` is `original` or `photos` for
-/// scores, with `view` a view's name or `mean`; for sizes, speeds and the rest both are empty. The PSNR of
-/// identical pictures is `inf`; the mean is over the views that are not identical.
+/// Returns a CSV with one number on each line.
+///
+/// `setting` is `original` for the model itself. For scores, `against` is `original` or `photos`, and `view` is the name
+/// of a view or `mean`. For sizes, frame rates and other numbers both are empty. The PSNR of identical pictures is `inf`.
+/// Its mean is over the views that are not identical.
 pub(crate) fn long_csv(results: &Results) -> String {
     let mut lines: Vec<Vec<String>> = vec![HEADER.map(str::to_owned).into()];
     for scene in &results.scenes {
@@ -59,12 +61,12 @@ pub(crate) fn long_csv(results: &Results) -> String {
     csv_text(lines)
 }
 
-/// A number that is no score.
+/// Returns the columns of a number that is not a score.
 fn number(name: &str, value: Option<impl ToString>) -> Option<Value> {
     value.map(|value| [String::new(), String::new(), name.to_owned(), value.to_string()])
 }
 
-/// Means over the views, then the scores of each view.
+/// Returns the means over the views, then the scores of each view.
 fn scores(against: &str, comparison: Option<&Comparison>) -> Vec<Value> {
     let Some(comparison) = comparison.filter(|comparison| !comparison.views.is_empty()) else {
         return Vec::new();

@@ -11,35 +11,36 @@ use super::results::Method;
 use lexisplat_compress::views::SplitFilter;
 use lexisplat_compress::{Error, Result};
 
-/// Largest manifest, in bytes: 40 times that of the paper's 13 scenes by five methods.
+/// Largest size of a manifest, in bytes: 40 times the size for the paper's 13 scenes by five methods.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// One model of a sweep.
+/// A model of a sweep.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Entry {
-    /// Data set, such as `Mip-NeRF 360`; may be empty.
+    /// Name of the data set, such as `Mip-NeRF 360`; may be empty.
     #[serde(default)]
     pub dataset: String,
-    /// Scene, such as `bonsai`.
+    /// Name of the scene, such as `bonsai`.
     pub name: String,
-    /// Who trained it.
+    /// Method that trained the model.
     pub method: Method,
     /// The model, a PLY.
     pub model: PathBuf,
-    /// Cameras: a `cameras.json`, a `transforms.json`, or a COLMAP folder. Without, views are generated.
+    /// Path of the cameras: a `cameras.json`, a `transforms.json`, or a COLMAP folder. Without cameras views are
+    /// generated.
     pub cameras: Option<PathBuf>,
-    /// Folder of photos. Without, models are scored against the original only.
+    /// Folder of photos. Without photos models are only scored against the original.
     pub images: Option<PathBuf>,
     /// Divisor of the photos' size: 1, 2, 4 or 8, as in [`lexisplat_compress::views::ViewOptions`].
     pub resolution: Option<u32>,
     /// Distance of the near plane, as in [`lexisplat_compress::views::ViewOptions`].
     pub near: Option<f32>,
-    /// Which of the cameras to use. The default is the test split.
+    /// Cameras to use. The default is the test split.
     #[serde(default = "test_split")]
     pub split: SplitFilter,
-    /// A file that is shipped in place of the model. It is counted, not read.
+    /// A file that is shipped instead of the model. Its size is counted, but the file is not read.
     pub shipped: Option<PathBuf>,
 }
 
@@ -48,13 +49,14 @@ fn test_split() -> SplitFilter {
 }
 
 impl Entry {
-    /// All paths.
+    /// Returns all paths.
     fn paths(&self) -> impl Iterator<Item = &Path> {
         let others = [&self.cameras, &self.images, &self.shipped].into_iter().flatten();
         others.chain([&self.model]).map(PathBuf::as_path)
     }
 
-    /// A model on its own: the scene's name is taken from the path, the method is [`Method::Other`].
+    /// Returns the entry of a single model. The name of the scene is taken from the path, and the method is
+    /// [`Method::Other`].
     #[must_use]
     pub fn of_model(model: &Path) -> Self {
         Self {
@@ -72,7 +74,8 @@ impl Entry {
     }
 }
 
-/// The name of the scene: that of the file, or of the folder above `point_cloud/iteration_30000/point_cloud.ply`.
+/// Returns the name of the scene: the name of the file, or of the folder above
+/// `point_cloud/iteration_30000/point_cloud.ply`.
 fn name_of(model: &Path) -> String {
     let text = |part: &std::ffi::OsStr| part.to_string_lossy().into_owned();
     let stem = model.file_stem().map(text).unwrap_or_default();
@@ -96,15 +99,15 @@ struct Document {
     scene: Vec<Entry>,
 }
 
-/// Reads a manifest. Relative paths in it start at `root`, or else at the manifest's folder, and lead to nothing outside of it.
-/// Absolute ones are taken at their word.
+/// Reads a manifest. Relative paths in it start at `root`, or else at the folder of the manifest, and must stay inside
+/// this folder. Absolute paths may lead anywhere.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read. [`Error::Format`] with line and field if it is no manifest, if two entries have the
-/// same data set, name and method, or if a relative path leads out of its folder.
+/// [`Error::Io`] if the manifest cannot be read. [`Error::Format`] with line and field if it is not a manifest, if two
+/// entries have the same data set, name and method, or if a relative path leads out of its folder.
 pub fn read_manifest(path: &Path, root: Option<&Path>) -> Result<Vec<Entry>> {
     let mut text = String::new();
-    // A device may have no size, and no end.
+    // A device may have no size and no end, so the number of bytes read is limited.
     let read = std::fs::File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text));
     read.map_err(|e| Error::io(path, e))?;
     if text.len() as u64 > MAX_BYTES {
@@ -115,7 +118,7 @@ pub fn read_manifest(path: &Path, root: Option<&Path>) -> Result<Vec<Entry>> {
     let entries = parse_manifest(path, &text, root)?;
     for named in entries.iter().flat_map(Entry::paths) {
         match named.strip_prefix(root).map(|named| inside(root, named)) {
-            // What is not there is said where it is needed, with the scene.
+            // A file that does not exist is reported later, where it is needed, with its scene.
             Err(_) | Ok(Ok(_) | Err(lexisplat::Error::Io { .. })) => {}
             Ok(Err(error)) => return Err(error.into()),
         }
@@ -123,7 +126,7 @@ pub fn read_manifest(path: &Path, root: Option<&Path>) -> Result<Vec<Entry>> {
     Ok(entries)
 }
 
-/// The entries of the manifest `text`. Errors name `file`. Relative paths start at `root`.
+/// Returns the entries of the manifest `text`. Errors name `file`. Relative paths start at `root`.
 ///
 /// # Errors
 /// As [`read_manifest`].

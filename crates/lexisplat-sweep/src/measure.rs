@@ -1,4 +1,4 @@
-//! What is measured of a compressed model, in one description for tables, figures and the page.
+//! The measures of a compressed model, described once for tables, figures and the page.
 
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, FrameRate};
@@ -6,45 +6,45 @@ use lexisplat_eval::{Comparison, FrameRate};
 use crate::numbers::{number, signed};
 use crate::{Point, SceneResult};
 
-/// Digits of ratios, nonzeros, bytes a Gaussian and differences in dB, as the paper prints them.
+/// Number of digits of ratios, nonzeros, bytes per Gaussian and differences in dB, as in the paper.
 const DIGITS: usize = 2;
-/// Digits of frames a second, as the paper prints them.
+/// Number of digits of frames per second, as in the paper.
 const FPS_DIGITS: usize = 1;
-/// What stands for the PSNR of pictures that do not differ.
+/// Text instead of the PSNR of identical pictures.
 const IDENTICAL: &str = "identical";
 
-/// A number known of a model at one setting.
+/// A measure of a model at one setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Measure {
-    /// A score against the original's pictures, averaged over views.
+    /// Score against the original's pictures, averaged over views.
     ToOriginal(Metric),
-    /// A score against photos, averaged over views.
+    /// Score against photos, averaged over views.
     ToPhotos(Metric),
-    /// PSNR against photos of the compressed minus that of the original, in dB. A loss is negative.
+    /// PSNR against photos of the compressed model minus that of the original, in dB. A loss is negative.
     PhotoChange,
-    /// Nonzeros of a Gaussian on average.
+    /// Mean number of nonzeros of a Gaussian.
     MeanNonzeros,
     /// The paper's ratio.
     CoefficientRatio,
     /// Bytes of the PLY over bytes of the file.
     FileRatio,
-    /// Bytes of the file over Gaussians.
+    /// Bytes of the file over the number of Gaussians.
     BytesEach,
-    /// Frames a second from codes.
+    /// Frames per second of the compressed model, drawn from codes.
     SparseFps,
-    /// Frames a second of the original from dense SH.
+    /// Frames per second of the original, drawn from dense SH.
     DenseFps,
-    /// Frames from codes over frames from dense SH.
+    /// Frame rate from codes over frame rate from dense SH.
     Speedup,
-    /// By how much the rounds of drawing from codes differ: half of the difference of the fastest and the slowest, in percent
-    /// of the mean.
+    /// Spread of the rounds of drawing from codes: half of the difference of the fastest and the slowest round, in
+    /// percent of the mean.
     SparseSpread,
-    /// The same of the original from dense SH.
+    /// Spread of the rounds of drawing the original from dense SH, in the same unit.
     DenseSpread,
 }
 
 impl Measure {
-    /// The heading, with its unit.
+    /// Returns the heading, with its unit.
     pub(crate) fn heading(self) -> &'static str {
         match self {
             Self::ToOriginal(Metric::Psnr) | Self::ToPhotos(Metric::Psnr) => "PSNR, dB",
@@ -61,7 +61,7 @@ impl Measure {
         }
     }
 
-    /// The number as people read it, if there is one.
+    /// Returns the number as text for people; a dash if there is none.
     pub(crate) fn shown(self, value: Option<f64>) -> String {
         match (self, value) {
             (Self::ToOriginal(Metric::Psnr) | Self::ToPhotos(Metric::Psnr), Some(f64::INFINITY)) => {
@@ -76,7 +76,8 @@ impl Measure {
         }
     }
 
-    /// The number. Without a point it is that of the model as trained. The PSNR of pictures without any difference is infinite.
+    /// Returns the number. Without a point it is the number of the model as trained. The PSNR of identical pictures is
+    /// infinite.
     pub(crate) fn value(self, scene: &SceneResult, point: Option<&Point>) -> Option<f64> {
         let score = |comparison: Option<&Comparison>, metric: Metric| {
             let comparison = comparison.filter(|comparison| !comparison.views.is_empty())?;
@@ -107,7 +108,8 @@ impl Measure {
     }
 }
 
-/// The mean of the finite numbers among `values`. Without any it is infinite if one of them is: all pictures are identical.
+/// Returns the mean of the finite `values`. If none is finite and one is infinite, returns infinity, because all pictures
+/// are identical then.
 pub(crate) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let values: Vec<f64> = values.collect();
     let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
@@ -117,12 +119,12 @@ pub(crate) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     }
 }
 
-/// Half of the range of rounds in percent of their mean.
+/// Returns half of the range of the rounds, in percent of their mean.
 fn spread(rate: FrameRate) -> Option<f64> {
     Some(50.0 * quotient(rate.most - rate.least, rate.mean)?)
 }
 
-/// `a / b`, or `None` if `b` is not above 0.
+/// Returns `a / b`; `None` if `b` is not above 0.
 fn quotient(a: f64, b: f64) -> Option<f64> {
     (b > 0.0).then(|| a / b)
 }

@@ -1,20 +1,20 @@
-//! Numbers as pages and tables show them.
+//! Numbers as text for pages and tables.
 
-/// What stands for a missing value.
+/// Text instead of a missing value.
 pub(crate) const DASH: &str = "\u{2013}";
 
-/// `value` with `digits` after the point, or a dash if there is none.
+/// Returns `value` with `digits` digits after the point, or a dash for `None`.
 pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     let text = |value| without_sign_of_zero(format!("{value:.digits$}"));
     value.filter(|v: &f64| v.is_finite()).map_or_else(|| DASH.to_owned(), text)
 }
 
-/// `value` with its sign and `digits` after the point. What is rounded to zero has no sign.
+/// Returns `value` with its sign and `digits` digits after the point. A value that is rounded to zero has no sign.
 pub(crate) fn signed(value: f64, digits: usize) -> String {
     without_sign_of_zero(format!("{value:+.digits$}"))
 }
 
-/// `text` without the sign if it is a zero.
+/// Returns `text` without its sign if it is a zero.
 fn without_sign_of_zero(text: String) -> String {
     match text.strip_prefix(['-', '+']) {
         Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
@@ -22,7 +22,7 @@ fn without_sign_of_zero(text: String) -> String {
     }
 }
 
-/// `a / b` as `2.7x`, or a dash if `b` is 0.
+/// Returns `a / b` as text such as `2.70×`, or a dash if `b` is 0.
 pub(crate) fn ratio(a: f64, b: f64) -> String {
     if b > 0.0 { format!("{:.2}\u{d7}", a / b) } else { DASH.to_owned() }
 }

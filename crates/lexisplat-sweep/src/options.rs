@@ -12,29 +12,30 @@ use lexisplat_compress::{DrawOptions, Error, Result, ViewOptions};
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct SweepOptions {
-    /// Ways to compress, each of them once, in the order of tables.
+    /// Ways of compressing, each of them once, in the order of tables.
     pub settings: Vec<Setting>,
-    /// The pursuit of settings with exact geometry. The default is the paper's.
+    /// Pursuit of settings with exact geometry. The default is that of the paper.
     pub pursuit: Pursuit,
-    /// The layout of settings with exact geometry.
+    /// Layout of settings with exact geometry.
     pub layout: Layout,
-    /// Seed of learning samples.
+    /// Seed of the choice of Gaussians from which dictionaries are learned.
     pub seed: u64,
-    /// How pictures are drawn.
+    /// Options of drawing.
     pub drawing: DrawOptions,
-    /// Whether to measure frames a second.
+    /// Whether to measure frames per second.
     pub fps: bool,
-    /// The views of models. Their cameras, photos, resolution and split are those of each [`Entry`](crate::Entry).
+    /// Options of the views of models. Cameras, photos, resolution and split come from each [`Entry`](crate::Entry)
+    /// instead.
     pub views: ViewOptions,
-    /// The GPU that draws. `None` stands for the processor.
+    /// The GPU that draws; `None` stands for the processor.
     pub gpu: Option<Gpu>,
     /// Limits on the size of models.
     pub limits: Limits,
     /// Number of views of each model whose pictures are saved.
     pub pictures: usize,
-    /// Whether finished parts in the folder are used.
+    /// Whether finished parts in the folder are reused.
     pub resume: bool,
-    /// Describes what changes scores but is not among these options, such as the weights of LPIPS.
+    /// Text that identifies everything that changes scores and is not among these options, such as the weights of LPIPS.
     pub fingerprint: String,
     /// The group of all files that the sweep writes.
     pub outputs: OutputGroup,
@@ -64,7 +65,7 @@ impl SweepOptions {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there are none, or if one is repeated or out of range.
+    /// [`Error::Parameter`] if there are no settings, or if one is repeated or out of range.
     pub(super) fn check(&self) -> Result<()> {
         if self.settings.is_empty() {
             return Err(Error::parameter("settings", "none", "a tolerance, a cap on nonzeros or a preset"));
@@ -88,14 +89,14 @@ impl SweepOptions {
     }
 }
 
-/// Receives reports from a sweep, and may cancel it. Every method does nothing by default.
+/// Receives reports from a sweep, and may cancel it. By default every method does nothing.
 pub trait SweepProgress: Progress {
-    /// The sweep starts and has so many parts.
+    /// Called when the sweep starts, with the number of its parts.
     fn start(&self, _parts: u64) {}
-    /// A part begins. The text names model and setting.
+    /// Called when a part begins. The text names the model and the setting.
     fn part(&self, _what: &str) {}
-    /// One more part is done. It is `reused` if an earlier run had finished it.
+    /// Called when a part is done. `reused` tells whether an earlier run had finished it.
     fn done(&self, _reused: bool) {}
-    /// A warning about a model.
+    /// Called with a warning about a model.
     fn warn(&self, _model: &str, _warning: &str) {}
 }

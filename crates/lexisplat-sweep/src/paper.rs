@@ -9,68 +9,70 @@ use lexisplat_eval::metrics::Metric;
 use super::measure::{self, Measure};
 use super::{Method, Setting};
 
-/// Every printed number of the paper's three tables: main, by tolerance, against photos.
+/// Every number in the paper's three tables: main, by tolerance, against photos.
 const PRINTED: &str = include_str!("paper.csv");
-/// The tolerance of the paper's main table. Its table against photos names none; its text suggests the same.
+/// Tolerance of the paper's main table. The table against photos names no tolerance; the text suggests the same one.
 pub(crate) const TOLERANCE: f64 = 0.1;
-/// The pursuit of the paper's method, orthogonal matching pursuit (section 4), by its name in results.
+/// Pursuit of the paper's method, orthogonal matching pursuit (section 4), by its name in results.
 pub(crate) const PURSUIT: &str = "omp";
 /// Tolerances of the paper's supplementary table.
 pub(crate) const TOLERANCES: [f64; 4] = [0.03, 0.05, 0.1, 0.2];
 /// Largest difference of two tolerances that count as equal.
 const SAME: f64 = 1e-9;
 
-/// Columns of [`PRINTED`] before the scenes.
+/// Number of columns of [`PRINTED`] before the scenes.
 const LABELS: usize = 4;
 /// Number of the paper's scenes.
 const SCENE_COUNT: usize = 13;
 
-/// The paper's scenes, in the order of its main table: the headings of [`PRINTED`].
+/// The paper's scenes, in the order of its main table. They are the headings of [`PRINTED`].
 pub(crate) static SCENES: LazyLock<Vec<&str>> = LazyLock::new(|| {
     let header = PRINTED.lines().next().unwrap_or_default();
     header.split(',').skip(LABELS).take(SCENE_COUNT).collect()
 });
 
-/// One line of [`PRINTED`].
+/// A line of [`PRINTED`].
 #[derive(Debug, Deserialize)]
 struct Line {
-    /// `main`: Table 1, compressed at tolerance 0.1 against the original's pictures, with ratio and FPS. `tolerance`: the same
-    /// at each tolerance, of the supplement. `base` and `compressed`: the trained and the compressed model against photos.
+    /// Table of the number. `main`: Table 1, compressed at tolerance 0.1, against the original's pictures, with ratio and
+    /// FPS. `tolerance`: the same numbers at each tolerance, of the supplement. `base` and `compressed`: the trained and
+    /// the compressed model against photos.
     table: String,
     method: Method,
     tolerance: Option<f64>,
-    /// `psnr` in dB, `ssim`, `lpips`, of which the paper does not say which network and input range it used, `ratio`, which is 45
-    /// over mean nonzeros by the paper's own numbers, `fps`, and `fps_dense` of the original.
+    /// Quantity of the number: `psnr` in dB; `ssim`; `lpips`, of an unknown network and input range, because the paper
+    /// does not name them; `ratio`, which is 45 over mean nonzeros by the paper's own numbers; `fps`; and `fps_dense` of
+    /// the original.
     quantity: String,
-    /// In the order of [`SCENES`].
+    /// Numbers in the order of [`SCENES`].
     scenes: [f64; SCENE_COUNT],
-    /// As printed. A few do not follow from their columns.
+    /// Mean as printed. A few printed means do not follow from their columns.
     #[cfg_attr(not(test), expect(dead_code, reason = "tests tell which"))]
     mean: f64,
 }
 
 static LINES: LazyLock<Vec<Line>> = LazyLock::new(|| {
     let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(PRINTED.as_bytes());
-    // Without headers fields are read in order. The first line names the columns.
+    // Without headers, fields are read in order. The first line names the columns, and is skipped.
     reader.deserialize().skip(1).filter_map(Result::ok).collect()
 });
 
-/// Whether two tolerances are equal up to rounding.
+/// Returns whether two tolerances are equal up to rounding.
 fn same_tolerance(a: f64, b: f64) -> bool {
     (a - b).abs() < SAME
 }
 
-/// Whether a scene is one of the paper's.
+/// Returns whether a scene is one of the paper's.
 pub(crate) fn has(name: &str) -> bool {
     scene(name).is_some()
 }
 
-/// The index of a scene in [`SCENES`]. Case does not matter.
+/// Returns the index of a scene in [`SCENES`]. Case does not matter.
 fn scene(name: &str) -> Option<usize> {
     SCENES.iter().position(|scene| scene.eq_ignore_ascii_case(name.trim()))
 }
 
-/// The number printed in a table. `None` if there is none.
+/// Returns the number printed in a table; `None` if there is none.
 fn printed(table: &str, tolerance: Option<f64>, method: Method, quantity: &str, name: &str) -> Option<f64> {
     let is_same = |line: &&Line| match (line.tolerance, tolerance) {
         (Some(a), Some(b)) => same_tolerance(a, b),
@@ -82,8 +84,8 @@ fn printed(table: &str, tolerance: Option<f64>, method: Method, quantity: &str, 
     line.scenes.get(scene(name)?).copied()
 }
 
-/// What the paper has of a measure: of models as trained without a setting, or else compressed. Its FPS are of another device,
-/// and its LPIPS is taken for the 3DGS repository's.
+/// Returns the paper's number for a measure: without a setting that of models as trained, otherwise that of compressed
+/// models. The paper's FPS are of another device. Its LPIPS is assumed to be that of the 3DGS repository.
 pub(crate) fn value(measure: Measure, method: Method, setting: Option<Setting>, scene: &str) -> Option<f64> {
     let tolerance = match setting {
         Some(Setting::Tolerance(tolerance)) => Some(tolerance),
@@ -110,8 +112,8 @@ pub(crate) fn value(measure: Measure, method: Method, setting: Option<Setting>, 
     printed(table, tolerance, method, quantity, scene)
 }
 
-/// The mean over the 13 scenes at the main tolerance, computed from their columns: a few printed means do not follow from
-/// theirs. `None` if the paper has none.
+/// Returns the mean over the 13 scenes at the main tolerance; `None` if the paper has no such numbers. It is computed
+/// from the columns, because a few printed means do not follow from their columns.
 pub(crate) fn mean(measure: Measure, method: Method) -> Option<f64> {
     let setting = Some(Setting::Tolerance(TOLERANCE));
     measure::mean(SCENES.iter().filter_map(|scene| value(measure, method, setting, scene)))

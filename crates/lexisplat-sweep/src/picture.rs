@@ -4,30 +4,30 @@ use std::path::PathBuf;
 
 use lexisplat_compress::{Error, Result};
 
-/// One view of a model at one setting, as PNG files of one size.
+/// The pictures of one view of a model at one setting, as PNG files of the same size.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PictureFiles {
     /// Index of the scene in [`Results::scenes`](super::Results::scenes).
     pub scene: usize,
-    /// The label of its [`Setting`](super::Setting).
+    /// Label of the [`Setting`](super::Setting).
     pub setting: String,
-    /// The view's name.
+    /// Name of the view.
     pub view: String,
-    /// The original.
+    /// Picture of the original.
     pub original: PathBuf,
-    /// The compressed.
+    /// Picture of the compressed model.
     pub compressed: PathBuf,
-    /// Their difference, [`AMPLIFICATION`](lexisplat_eval::montage::AMPLIFICATION) times as bright.
+    /// Difference of both pictures, times [`AMPLIFICATION`](lexisplat_eval::montage::AMPLIFICATION).
     pub difference: PathBuf,
-    /// The photo from the same camera, if there is one.
+    /// Photo from the same camera, if there is one.
     pub photo: Option<PathBuf>,
 }
 
 /// A picture for the page.
 pub(crate) struct Part {
-    /// The class in the page's style sheet.
+    /// Class in the page's style sheet.
     pub(crate) class: &'static str,
-    /// What it shows.
+    /// Contents of the picture, in words.
     pub(crate) what: &'static str,
     pub(crate) png: Vec<u8>,
 }

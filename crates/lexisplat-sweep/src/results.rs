@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 use lexisplat_compress::{Error, Result};
 use lexisplat_eval::{Comparison, FrameRate};
 
-/// Who trained a model.
+/// The method that trained a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// The 3DGS authors' trainer.
+    /// Trainer of the 3DGS authors.
     #[serde(rename = "3dgs")]
     Gs3d,
     /// 3DGS-MCMC.
@@ -21,20 +21,20 @@ pub enum Method {
     /// Pixel-GS.
     #[serde(rename = "pixelgs")]
     PixelGs,
-    /// EAGLES, decoded to a PLY: the paper's competitor, with scalar quantisation.
+    /// EAGLES, decoded to a PLY. It is the paper's competitor, with scalar quantisation.
     Eagles,
     /// EAGLES trained without scalar quantisation.
     EaglesNoSq,
-    /// Anything else.
+    /// Any other method.
     Other,
 }
 
 impl Method {
-    /// All of them, in the paper's order.
+    /// All methods, in the order of the paper.
     pub(crate) const ALL: [Self; 6] =
         [Self::Gs3d, Self::Mcmc, Self::PixelGs, Self::Eagles, Self::EaglesNoSq, Self::Other];
 
-    /// The name in files and manifests, and the name for people, as the paper prints it.
+    /// Returns the name in files and manifests, and the name for people, as in the paper.
     fn names(self) -> (&'static str, &'static str) {
         match self {
             Self::Gs3d => ("3dgs", "3DGS"),
@@ -46,17 +46,17 @@ impl Method {
         }
     }
 
-    /// Name in files and manifests.
+    /// Returns the name in files and manifests.
     pub(crate) fn name(self) -> &'static str {
         self.names().0
     }
 
-    /// Name for people, as the paper prints it.
+    /// Returns the name for people, as in the paper.
     pub(crate) fn title(self) -> &'static str {
         self.names().1
     }
 
-    /// Whether the method compresses by itself, so that its models are only scored, not compressed.
+    /// Returns whether the method compresses by itself. Its models are only scored, not compressed.
     pub(crate) fn is_competitor(self) -> bool {
         matches!(self, Self::Eagles | Self::EaglesNoSq)
     }
@@ -79,21 +79,21 @@ impl FromStr for Method {
     }
 }
 
-/// A way to compress models.
+/// A way of compressing models.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Setting {
-    /// SH within this un-squared L2 norm, geometry exact. The paper has this kind.
+    /// Exact geometry, and SH within this un-squared L2 norm. The paper has settings of this kind.
     Tolerance(f64),
-    /// At most this many nonzeros for each Gaussian, no tolerance, geometry exact.
+    /// Exact geometry, and at most this many nonzeros for each Gaussian, without a tolerance.
     MaxNonzeros(u8),
-    /// A packed file by preset: everything quantised.
+    /// A packed file with this preset. Everything is quantised.
     Preset(#[serde(with = "by_name")] Preset),
 }
 
 impl Setting {
-    /// Short name, unique within a sweep: `tol 0.1`, `nnz 1`, `balanced`.
+    /// Returns a short name, unique within a sweep: `tol 0.1`, `nnz 1`, `balanced`.
     #[must_use]
     pub fn label(self) -> String {
         match self {
@@ -104,7 +104,7 @@ impl Setting {
     }
 }
 
-/// Presets in files: by name.
+/// Serialises presets by name.
 mod by_name {
     use lexisplat::packed::Preset;
     use serde::de::{Deserialize, Deserializer, Error as _};
@@ -119,19 +119,19 @@ mod by_name {
     }
 }
 
-/// Frames a second, measured in turn.
+/// Frame rates, measured in turn.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fps {
-    /// Of the original, from dense SH.
+    /// Frame rate of the original, drawn from dense SH.
     pub dense: FrameRate,
-    /// Of the compressed model, straight from codes.
+    /// Frame rate of the compressed model, drawn directly from codes.
     pub sparse: FrameRate,
 }
 
 /// One model compressed in one way.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// The way it was compressed.
+    /// The way of compressing.
     pub setting: Setting,
     /// Bytes of the whole file.
     pub file_bytes: u64,
@@ -139,21 +139,21 @@ pub struct Point {
     pub sh_bytes: u64,
     /// Bytes of colour in memory while drawing from codes, base colour included.
     pub resident_sh_bytes: u64,
-    /// Atoms of the dictionary.
+    /// Number of atoms of the dictionary.
     pub atoms: usize,
-    /// Nonzeros a Gaussian on average, an escape counting as a full vector.
+    /// Mean number of nonzeros of a Gaussian. An escape counts as a vector without zeros.
     pub mean_nonzeros: f64,
-    /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` where nothing is coded.
+    /// The paper's ratio: number of SH-rest coefficients over the mean number of nonzeros. `None` if nothing is coded.
     pub coefficient_ratio: Option<f64>,
-    /// Largest SH error of a Gaussian; `None` for packed files, which promise none.
+    /// Largest SH error of a Gaussian; `None` for packed files, which have no bound.
     pub max_residual: Option<f64>,
-    /// Gaussians over the tolerance; 0 unless nonzeros are capped.
+    /// Number of Gaussians over the tolerance; 0 unless nonzeros are capped.
     pub over_tolerance: u64,
     /// Scores of the compressed model against the original's pictures.
     pub to_original: Comparison,
     /// Scores of the compressed model against photos.
     pub to_photos: Option<Comparison>,
-    /// Frames a second, if measured.
+    /// Frame rates, if measured.
     pub fps: Option<Fps>,
     /// Seconds of compression, learning included.
     pub seconds: f64,
@@ -162,13 +162,13 @@ pub struct Point {
 /// One model, with all its points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneResult {
-    /// Data set, such as `Mip-NeRF 360`; empty if unknown.
+    /// Name of the data set, such as `Mip-NeRF 360`; empty if unknown.
     pub dataset: String,
-    /// Scene, such as `bonsai`.
+    /// Name of the scene, such as `bonsai`.
     pub name: String,
-    /// Who trained it.
+    /// Method that trained the model.
     pub method: Method,
-    /// The model's file, by a name without folders of this machine.
+    /// Name of the model's file, without folders of this machine.
     pub model: String,
     /// Number of Gaussians.
     pub gaussians: u64,
@@ -178,26 +178,26 @@ pub struct SceneResult {
     pub ply_bytes: u64,
     /// Bytes of the file that a competitor ships instead, if the manifest names it.
     pub shipped_bytes: Option<u64>,
-    /// Source of the views: a file's name, or `orbit` or `room`.
+    /// Source of the views: the name of a file, or `orbit` or `room`.
     pub views_from: String,
     /// Number of views.
     pub views: usize,
     /// Width and height of the first view's picture.
     pub size: [u32; 2],
-    /// The device that drew pictures: `cpu`, or the GPU's name. FPS are of this device.
+    /// Device that drew the pictures: `cpu`, or the name of a GPU. Frame rates are of this device.
     pub device: String,
     /// Whether the device is a GPU.
     pub on_gpu: bool,
     /// Scores of the model as trained against photos.
     pub to_photos: Option<Comparison>,
-    /// Frames a second of the model as trained, if measured.
+    /// Frames per second of the model as trained, if measured.
     pub fps: Option<f64>,
-    /// One for each setting.
+    /// Results at each setting.
     pub points: Vec<Point>,
 }
 
 impl SceneResult {
-    /// The point at a setting.
+    /// Returns the point at a setting.
     pub(crate) fn point(&self, setting: Setting) -> Option<&Point> {
         self.points.iter().find(|point| point.setting == setting)
     }
@@ -206,13 +206,13 @@ impl SceneResult {
 /// A model that could not be evaluated.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Skipped {
-    /// Data set.
+    /// Name of the data set.
     pub dataset: String,
-    /// Scene.
+    /// Name of the scene.
     pub name: String,
-    /// Who trained it.
+    /// Method that trained the model.
     pub method: Method,
-    /// The reason.
+    /// Reason for skipping the model.
     pub reason: String,
 }
 
@@ -223,20 +223,21 @@ pub struct Results {
     pub version: String,
     /// The command line.
     pub command: String,
-    /// `omp` or `ols`.
+    /// Pursuit of files with exact geometry: `omp` or `ols`.
     pub pursuit: String,
     /// Layout of files with exact geometry: `f16`, `f32` or `paper`.
     pub layout: String,
     /// Whether pictures were rounded to 8 bits before scoring.
     pub eight_bit: bool,
-    /// Models that were evaluated, in the manifest's order.
+    /// Models that were evaluated, in the order of the manifest.
     pub scenes: Vec<SceneResult>,
-    /// Models that were not.
+    /// Models that were not evaluated.
     pub skipped: Vec<Skipped>,
 }
 
 impl Results {
-    /// The pursuit and the layout of files with exact geometry, for captions. Empty if they are not known.
+    /// Returns the pursuit and the layout of files with exact geometry, for captions. The text is empty if they are not
+    /// known.
     pub(crate) fn how(&self) -> String {
         let pursuit = match self.pursuit.as_str() {
             "" => return String::new(),

@@ -1,4 +1,4 @@
-//! One model of a sweep. Each part of its results is stored as soon as it is finished.
+//! Evaluates one model of a sweep. Each part of its results is stored as soon as it is finished.
 
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -25,27 +25,28 @@ use super::options::{SweepOptions, SweepProgress};
 use super::picture::PictureFiles;
 use super::results::{Fps, Point, SceneResult, Setting};
 
-/// Frames timed from each view on a GPU, as the 3DGS authors do (INRIA `gaussian-splatting` issue 351).
+/// Number of timed frames of each view on a GPU, as in measurements of the 3DGS authors (INRIA `gaussian-splatting` issue
+/// 351).
 const GPU_REPEAT: u32 = 100;
-/// Frames timed from each view on the processor: enough to show the spread.
+/// Number of timed frames of each view on the processor. It is enough to show the spread.
 const CPU_REPEAT: u32 = 5;
-/// Frames drawn from each view before timing.
+/// Number of frames drawn of each view before timing.
 const WARMUP: u32 = 1;
-/// What names of files call pictures of a model as trained.
+/// Word for pictures of a model as trained in file names.
 const ORIGINAL: &str = "original";
-/// What names of files call photos.
+/// Word for photos in file names.
 const PHOTO: &str = "photo";
 
-/// The settings that a model is compressed at.
+/// Returns the settings at which a model is compressed.
 pub(super) fn settings<'a>(entry: &Entry, options: &'a SweepOptions) -> &'a [Setting] {
     if entry.method.is_competitor() { &[] } else { &options.settings }
 }
 
-/// The reason why work on a scene ended early.
+/// Reason why work on a scene ended early.
 pub(super) enum Failure {
-    /// This scene cannot be evaluated; others may.
+    /// This scene cannot be evaluated. Other scenes may be.
     Scene(String),
-    /// No other scene can be evaluated either: the disk is full, the GPU is lost, or the sweep is cancelled.
+    /// No other scene can be evaluated either: the disk is full, the GPU is lost, or the sweep was cancelled.
     Sweep(Error),
 }
 
@@ -69,27 +70,27 @@ struct Original {
     fps: Option<f64>,
 }
 
-/// A model under evaluation.
+/// A model that is being evaluated.
 struct Subject {
     splats: Splats,
     cameras: Vec<Camera>,
-    /// The views that have photos.
+    /// Views that have photos.
     photos: Vec<View>,
-    /// Describes everything that results depend on except the setting.
+    /// Text that describes everything on which results depend, except the setting.
     key: String,
-    /// Start of the names of the model's files.
+    /// Prefix of the names of the model's files.
     name: String,
     /// Indices of the views whose pictures are saved.
     shown: Vec<usize>,
-    /// Pictures of the original and photos, made when the first part needs them.
+    /// Pictures of the original, and photos. They are made when the first part needs them.
     references: Option<References>,
     looked: Option<Arc<Looked>>,
 }
 
-/// Pictures that others are compared with, one for each view.
+/// Pictures with which others are compared, one for each view.
 struct References {
     originals: Vec<Image>,
-    /// Empty without photos.
+    /// Photos; empty if there are none.
     photos: Vec<Image>,
 }
 
@@ -183,7 +184,7 @@ impl Evaluator<'_> {
         options
     }
 
-    /// Describes everything that results depend on except the setting.
+    /// Returns a text that describes everything on which results depend, except the setting.
     fn key(&self, model: &str, cameras: &[Camera], photos: &[View]) -> Result<String> {
         let paths = photos.iter().filter_map(|view| view.photo.as_deref());
         let photos = paths.map(fingerprint).collect::<Result<Vec<_>>>()?;
@@ -204,8 +205,9 @@ impl Evaluator<'_> {
         ))
     }
 
-    /// A part of a scene: its point at the setting `label`, or without a label what is known of the original. It is the
-    /// stored part if that was made from the same and its pictures still exist, or else what `make` makes.
+    /// Returns a part of a scene: its point at the setting `label`, or without a label the results of the original.
+    /// Returns the stored part if it was made from the same inputs and its pictures still exist, and otherwise the result
+    /// of `make`.
     fn part<T: Serialize + DeserializeOwned>(
         &mut self,
         subject: &mut Subject,
@@ -289,7 +291,7 @@ impl Evaluator<'_> {
         Ok(References { originals, photos })
     }
 
-    /// Scores of pictures against photos, if there are any.
+    /// Returns the scores of pictures against photos, if there are photos.
     fn score_photos(
         &self,
         subject: &Subject,
@@ -304,7 +306,7 @@ impl Evaluator<'_> {
         draw_views(&mut self.renderer, scene, cameras, &self.options.drawing, self.progress)
     }
 
-    /// Frames a second of `scenes`, drawn in turn; none if they are not asked for.
+    /// Returns the frame rates of `scenes`, drawn in turn. Returns none if they are not asked for.
     fn fps(&self, scenes: &[Scene<'_>], cameras: &[Camera]) -> Result<Vec<FrameRate>> {
         if !self.options.fps {
             return Ok(Vec::new());
@@ -318,7 +320,7 @@ impl Evaluator<'_> {
         }
     }
 
-    /// The path of a picture of a view.
+    /// Returns the path of a picture of a view.
     fn picture(&self, subject: &Subject, view: usize, what: &str) -> PathBuf {
         self.pictures.join(format!("{}-{view:03}-{}.png", subject.name, file_name(what)))
     }
@@ -344,8 +346,9 @@ impl Evaluator<'_> {
     }
 }
 
-/// `path` without folders of this machine: as given if it leads down from here, otherwise the file's name, with the folders
-/// of its training where that names all models alike.
+/// Returns `path` without folders of this machine. A path that leads down from the current folder stays as given.
+/// Otherwise it is reduced to the name of the file, and to the folders of its training if that name is the same for all
+/// models.
 #[must_use]
 pub fn shown_path(path: &Path) -> String {
     let is_down = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
@@ -362,7 +365,7 @@ pub fn shown_path(path: &Path) -> String {
     parts.iter().skip(parts.len().saturating_sub(kept)).collect::<PathBuf>().display().to_string()
 }
 
-/// `reason` with the paths of `entry` as [`shown_path`] has them.
+/// Returns `reason` with the paths of `entry` replaced by those of [`shown_path`].
 pub(super) fn without_paths(reason: &str, entry: &Entry) -> String {
     let paths = [Some(&entry.model), entry.cameras.as_ref(), entry.images.as_ref()];
     paths
@@ -374,13 +377,13 @@ pub(super) fn without_paths(reason: &str, entry: &Entry) -> String {
         })
 }
 
-/// Start of the names of an entry's files. No two entries share one.
+/// Returns the prefix of the names of an entry's files. No two entries have the same prefix.
 pub(super) fn file_start(entry: &Entry) -> String {
     let dataset = if entry.dataset.is_empty() { String::new() } else { format!("{}-", entry.dataset) };
     file_name(&format!("{dataset}{}-{}", entry.name, entry.method))
 }
 
-/// Length and checksum of a file.
+/// Returns the length and the checksum of a file, as text.
 fn fingerprint(path: &Path) -> Result<String> {
     let bytes = Input::open(path)?;
     Ok(format!("{}:{:08x}", bytes.len(), crc32fast::hash(&bytes)))

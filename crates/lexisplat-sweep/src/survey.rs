@@ -1,4 +1,4 @@
-//! Results in the layout of the 3DGS compression survey (`w-m/3dgs-compression-survey`): one CSV for each scene,
+//! Results in the layout of the 3DGS compression survey (`w-m/3dgs-compression-survey`): one CSV for each scene, with
 //! values against photos.
 
 use lexisplat_eval::Comparison;
@@ -7,14 +7,14 @@ use lexisplat_eval::metrics::Metric;
 
 use super::{Results, SceneResult, csv_text, unique};
 
-/// The survey's header.
+/// Header of the survey's CSV files.
 const HEADER: [&str; 6] = ["Submethod", "PSNR", "SSIM", "LPIPS", "Size [Bytes]", "#Gaussians"];
-/// Folder of scenes without a data set.
+/// Folder for scenes without a data set.
 const NO_DATASET: &str = "other";
 
-/// Files of the survey's layout: relative path and content. Scenes without photos are left out. The LPIPS column
-/// is the 3DGS repository's, as the survey's numbers are; it is empty where that was not measured. The PSNR of
-/// identical pictures is `inf`.
+/// Returns the files of the survey's layout: relative paths and contents. Scenes without photos are left out. The LPIPS
+/// column is that of the 3DGS repository, as in the survey; it is empty if that was not measured. The PSNR of identical
+/// pictures is `inf`.
 pub(crate) fn survey(results: &Results) -> Vec<(String, String)> {
     let mut files: Vec<(String, &SceneResult, Vec<Vec<String>>)> = Vec::new();
     for scene in &results.scenes {

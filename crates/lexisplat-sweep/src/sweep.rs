@@ -1,4 +1,4 @@
-//! All models of a sweep, one after the other.
+//! Evaluates all models of a sweep, one after the other.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -14,12 +14,12 @@ use super::picture::PictureFiles;
 use super::results::{Results, Skipped};
 use super::scene::{Evaluator, Failure, file_start, settings, without_paths};
 
-/// Evaluates every entry. `folder` holds finished parts and pictures.
+/// Evaluates every entry. Finished parts and pictures are stored in `folder`.
 ///
 /// Models that do not exist or cannot be evaluated are skipped, and listed with the reason.
 ///
 /// # Errors
-/// [`Error::Parameter`] for settings out of range, for two models of one name, or if no model can be evaluated.
+/// [`Error::Parameter`] for settings out of range, for two models of the same name, and if no model can be evaluated.
 /// Errors of preparing the GPU and of writing to `folder`, and [`lexisplat::Error::Cancelled`].
 pub fn sweep(
     entries: &[Entry],

@@ -1,4 +1,4 @@
-//! The tables of results. Their columns are measures, and the paper's numbers stand below ours.
+//! The tables of results. Their columns are measures. The numbers of the paper are below ours.
 
 use super::grid::Grid;
 use super::measure::{Measure, mean};
@@ -7,16 +7,16 @@ use super::table::{Row, Table};
 use super::{Point, Results, SceneResult, Setting, paper};
 use lexisplat_eval::format::count;
 
-/// What both tables say of their numbers.
+/// Caption of both tables: the meaning of their numbers.
 const CAPTION: &str = "Ratios say how many times smaller; Comp Ratio is the paper's, of coefficients, and counts neither indices \
                        nor anything but SH. Change is PSNR against photos of the compressed minus that of the original. Frames \
                        from codes and from dense SH are drawn in turn; \u{b1} is half of the range of rounds through all views. \
                        Pictures without any difference are \u{201c}identical\u{201d} and do not count in means.";
 
-/// What tables are made from.
+/// The data from which tables are made.
 struct Source<'a> {
     grid: Grid<'a>,
-    /// The measures that any model has, each with the heading of its group.
+    /// Measures that at least one model has, each with the heading of its group.
     measures: Vec<(String, Measure)>,
     results: &'a Results,
 }
@@ -41,16 +41,16 @@ impl<'a> Source<'a> {
         Self { measures: groups.into_iter().flat_map(named).collect(), grid, results }
     }
 
-    /// `table` with a column for each measure, and a caption that begins with `caption`.
+    /// Returns `table` with a column for each measure, and with a caption that begins with `caption`.
     fn with_measures(&self, mut table: Table, caption: &str) -> Table {
         table.add_columns(self.measures.iter().map(|(group, measure)| (&**group, measure.heading())));
         table.caption = format!("{caption} {CAPTION} {}", self.results.how()).trim().to_owned();
         table
     }
 
-    /// A row for each setting of `models`, which are of one method: means over those that have the number. Below it stand the
-    /// paper's, over the same scenes. If it has none of them and there is a column of how many scenes there are, they are over its
-    /// 13. `names` come first.
+    /// Returns a row for each setting of `models`, which are of one method. A row begins with `names`, and has means over
+    /// the models that have the number. Below it is a row with the paper's means over the same scenes. If the paper has
+    /// none of these scenes and `has_count` is set, its means are over its 13 scenes.
     fn rows(&self, models: &[&'a SceneResult], names: &[&str], has_count: bool) -> Vec<Row> {
         let mut rows = Vec::new();
         for setting in [None].into_iter().chain(self.grid.settings.iter().copied().map(Some)) {
@@ -72,7 +72,7 @@ impl<'a> Source<'a> {
             rows.push(row(&label, at.len(), &|m| {
                 mean(at.iter().filter_map(|(scene, point)| m.value(scene, *point)))
             }));
-            // Models as trained know no pursuit.
+            // Models as trained have no pursuit.
             let is_other = setting.is_some() && self.results.pursuit != paper::PURSUIT;
             let pursuit = if is_other { " (OMP)" } else { "" };
             let same: Vec<&str> =
@@ -88,7 +88,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Every method at every setting, averaged over its scenes.
+/// Returns the table of every method at every setting, averaged over its scenes.
 pub(crate) fn means(results: &Results) -> Table {
     let source = Source::new(results);
     let table = Table::new("means", "Means over scenes", 2, &["Method", "Setting", "Scenes"]);
@@ -101,7 +101,7 @@ pub(crate) fn means(results: &Results) -> Table {
     table
 }
 
-/// Every model at every setting.
+/// Returns the table of every model at every setting.
 pub(crate) fn scenes(results: &Results) -> Table {
     let source = Source::new(results);
     let table = Table::new("scenes", "Scene by scene", 3, &["Scene", "Method", "Setting"]);
@@ -112,7 +112,7 @@ pub(crate) fn scenes(results: &Results) -> Table {
     table
 }
 
-/// Every model that was evaluated.
+/// Returns the table of every model that was evaluated.
 pub(crate) fn models(results: &Results) -> Table {
     let headings = [
         "Scene",
@@ -152,7 +152,7 @@ pub(crate) fn models(results: &Results) -> Table {
     table
 }
 
-/// What could not be evaluated, and why.
+/// Returns the table of the models that could not be evaluated, with the reasons.
 pub(crate) fn skipped(results: &Results) -> Table {
     let mut table = Table::new("skipped", "Skipped", 4, &["Scene", "Method", "Data set", "Reason"]);
     table.push_block(results.skipped.iter().map(|skipped| {

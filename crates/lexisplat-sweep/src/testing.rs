@@ -1,4 +1,4 @@
-//! Made-up results for tests. Numbers are chosen so that cells can be computed by hand.
+//! Made-up results for tests. The numbers are chosen so that cells can be computed by hand.
 
 use lexisplat::packed::Preset;
 
@@ -6,7 +6,7 @@ use super::{Fps, Method, Point, Results, SceneResult, Setting, Skipped};
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, FrameRate, ViewScore};
 
-/// A scene's name that every format has to escape.
+/// Name of a scene that every format must escape.
 pub(super) const ODD: &str = "a&b|<c>\"_%$";
 
 pub(super) fn view(name: &str, psnr: Option<f64>) -> ViewScore {
@@ -15,13 +15,13 @@ pub(super) fn view(name: &str, psnr: Option<f64>) -> ViewScore {
     ViewScore::new(name, [64, 48], psnr, if identical { 1.0 } else { 0.9 }, more)
 }
 
-/// Rates whose rounds differ by 5 % to each side.
+/// Returns rates whose rounds differ by 5 % to each side.
 pub(super) fn fps(dense: f64, sparse: f64) -> Fps {
     let rate = |mean: f64| FrameRate { mean, least: 0.95 * mean, most: 1.05 * mean };
     Fps { dense: rate(dense), sparse: rate(sparse) }
 }
 
-/// Two views around `psnr`; both identical if there is none.
+/// Returns the comparison of two views with PSNRs around `psnr`; both views are identical for `None`.
 pub(super) fn comparison(psnr: Option<f64>) -> Comparison {
     Comparison::of(vec![view("front", psnr.map(|p| p - 1.0)), view("back|<", psnr.map(|p| p + 1.0))])
 }
@@ -65,8 +65,8 @@ pub(super) fn scene(dataset: &str, name: &str, method: Method) -> SceneResult {
     }
 }
 
-/// Three scenes: bonsai by all methods with photos, garden by one with identical pictures, an odd one by
-/// another; one more was skipped.
+/// Returns results of three scenes: bonsai by all methods with photos, garden by one method with identical pictures, and
+/// an odd scene by another method. One more scene was skipped.
 pub(super) fn results() -> Results {
     let fps = |dense, sparse| Some(fps(dense, sparse));
     let mut bonsai = scene("Mip-NeRF 360", "bonsai", Method::Gs3d);

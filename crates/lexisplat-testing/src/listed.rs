@@ -1,12 +1,12 @@
-//! Test files that nobody runs.
+//! Finds test files that no test binary includes.
 
 use std::path::Path;
 
-/// Asserts that each file of the folder `tests` is a module of one of `roots`, the files of its test binaries. Where
-/// `autotests` is off in Cargo.toml, Cargo would not run a file that none of them names, and not say so.
+/// Asserts that each file of the folder `tests` is a module of one of `roots`, which are the main files of the test
+/// binaries. If `autotests` is off in Cargo.toml, Cargo silently ignores a file that no root names.
 ///
 /// # Panics
-/// If a file is in none of them, or cannot be read.
+/// If no root names a file, or a file cannot be read.
 pub fn assert_every_file_is_listed(tests: &str, roots: &[&str]) {
     let tests = Path::new(tests);
     let read =

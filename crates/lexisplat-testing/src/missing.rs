@@ -1,19 +1,19 @@
-//! What a machine may lack, and how a test says so.
+//! Things that a machine may lack, and the report of a test that lacks one.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// The environment variable that names what must not be missing: names of [`Need`] with commas between them.
+/// Environment variable with the names of [`Need`] that must not be missing, with commas between them.
 pub const REQUIRE: &str = "LEXISPLAT_REQUIRE";
-/// The environment variable with the file to which [`missing`] adds a line for each skipped test.
+/// Environment variable with the path of the file to which [`missing`] adds a line for each skipped test.
 pub const SKIPPED: &str = "LEXISPLAT_SKIPPED";
-/// The environment variable with the folder of real models.
+/// Environment variable with the folder of real models.
 const DATA: &str = "LEXISPLAT_DATA";
 
-/// Something that a test needs and a machine may lack.
+/// A thing that a test needs and a machine may lack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Need {
-    /// A GPU, if only in software.
+    /// A GPU; one in software counts.
     Gpu,
     /// GPU drivers that an environment variable hides from a process.
     Drivers,
@@ -21,18 +21,18 @@ pub enum Need {
     Display,
     /// LaTeX with `booktabs`.
     Latex,
-    /// OpenGL, if only in software.
+    /// OpenGL; an implementation in software counts.
     OpenGl,
     /// The real models (see [`real_data_folder`]).
     Models,
-    /// The right to mount a file system in a namespace of one's own (Linux's `unshare -rm`).
+    /// The right to mount a file system in a namespace of its own (Linux's `unshare -rm`).
     Mounts,
-    /// The repository around the crate. A crate that was downloaded alone lacks it.
+    /// The repository around the crate. A crate that was downloaded alone has no repository.
     Repository,
 }
 
 impl Need {
-    /// What [`REQUIRE`] calls it.
+    /// Returns the name of the need in [`REQUIRE`].
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -47,23 +47,23 @@ impl Need {
         }
     }
 
-    /// Whether a list of names with commas between them has this one.
+    /// Returns whether `list`, names with commas between them, has this need.
     fn is_in(self, list: &str) -> bool {
         list.split(',').any(|name| name.trim() == self.name())
     }
 }
 
-/// Says that the running test is skipped because `need` is missing. The test should return after this call.
+/// Reports that the running test is skipped because `need` is missing. The test should return after this call.
 ///
 /// # Panics
-/// If [`REQUIRE`] names `need`, or the file that [`SKIPPED`] names cannot be written.
+/// If [`REQUIRE`] names `need`, or the file named by [`SKIPPED`] cannot be written.
 pub fn missing(need: Need, why: &str) {
     let thread = std::thread::current();
     let test = thread.name().unwrap_or("a test");
     let line = format!("skipped: {test} ({}): {}\n", need.name(), why.lines().next().unwrap_or_default());
     let required = std::env::var(REQUIRE).unwrap_or_default();
     assert!(!need.is_in(&required), "{REQUIRE} = {required}, but {line}");
-    // Unlike `eprintln!`, this is shown for tests that pass too.
+    // Unlike the output of `eprintln!`, this line is also shown for tests that pass.
     let _ = std::io::stderr().write_all(line.as_bytes());
     if let Some(list) = std::env::var_os(SKIPPED) {
         let file = std::fs::File::options().create(true).append(true).open(&list);
@@ -72,8 +72,8 @@ pub fn missing(need: Need, why: &str) {
     }
 }
 
-/// The folder of real models: `LEXISPLAT_DATA`, or `../shared/data` beside the repository. `None`, and the running
-/// test is skipped, if it is not there.
+/// Returns the folder of real models: `LEXISPLAT_DATA`, or `../shared/data` beside the repository. If it does not exist,
+/// reports the running test as skipped and returns `None`.
 ///
 /// # Panics
 /// As [`missing`].
@@ -83,7 +83,8 @@ pub fn real_data_folder() -> Option<PathBuf> {
     there(folder, Need::Models)
 }
 
-/// `name` in the folder of real models. `None`, and the running test is skipped, if it is not there.
+/// Returns the path of `name` in the folder of real models. If it does not exist, reports the running test as skipped and
+/// returns `None`.
 ///
 /// # Panics
 /// As [`missing`].
@@ -92,7 +93,8 @@ pub fn real_data(name: &str) -> Option<PathBuf> {
     there(real_data_folder()?.join(name), Need::Models)
 }
 
-/// A file of the repository, by its path from the root. `None`, and the running test is skipped, if it is not there.
+/// Returns the path of a file of the repository. `path` is relative to the root. If the file does not exist, reports the
+/// running test as skipped and returns `None`.
 ///
 /// # Panics
 /// As [`missing`].
@@ -109,7 +111,7 @@ fn there(path: PathBuf, need: Need) -> Option<PathBuf> {
     None
 }
 
-/// The root of the repository.
+/// Returns the root of the repository.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }

@@ -5,13 +5,13 @@
 pub struct Random(u64);
 
 impl Random {
-    /// A generator that always gives the same numbers for the same seed.
+    /// Returns a generator. The same seed gives the same numbers.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// The next 64 random bits.
+    /// Returns the next 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -20,7 +20,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// A whole number below `bound`.
+    /// Returns a whole number below `bound`.
     ///
     /// # Panics
     /// If `bound` is 0.
@@ -28,24 +28,24 @@ impl Random {
         usize::try_from(self.bits() % bound as u64).unwrap_or(0)
     }
 
-    /// A random byte.
+    /// Returns a random byte.
     pub fn byte(&mut self) -> u8 {
         self.bits().to_le_bytes()[0]
     }
 
-    /// A number in \[0, 1), a multiple of 2^-24.
+    /// Returns a number in \[0, 1), a multiple of 2^-24.
     pub fn unit(&mut self) -> f32 {
         #[expect(clippy::cast_precision_loss, reason = "24 bits fit f32")]
         let bits = (self.bits() >> 40) as f32;
         bits / (1 << 24) as f32
     }
 
-    /// A number in \[`low`, `high`).
+    /// Returns a number in \[`low`, `high`).
     pub fn within(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
-    /// A number in \[-1, 1), a multiple of 2^-15.
+    /// Returns a number in \[-1, 1), a multiple of 2^-15.
     pub fn signed(&mut self) -> f32 {
         let [low, high, ..] = self.bits().to_le_bytes();
         f32::from(u16::from_le_bytes([low, high])) / 32768.0 - 1.0

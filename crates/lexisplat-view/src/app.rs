@@ -1,4 +1,4 @@
-//! The window: takes events of its threads and keys, shows its parts, and continues the script.
+//! The window. It takes keys and the events of its threads, shows its parts, and continues the script.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -25,13 +25,13 @@ use crate::scene_renderer::{CpuSceneRenderer, GpuSceneRenderer, SceneRenderer};
 use crate::script::Script;
 use crate::state::State;
 
-/// The picture is drawn in full resolution after this long without motion.
+/// Time without motion after which the picture is drawn in full resolution.
 const REST: Duration = Duration::from_millis(200);
-/// Time that a picture may take during motion, in milliseconds.
+/// Time that a picture may take while the view moves, in milliseconds.
 const MOVING_BUDGET: f64 = 80.0;
-/// Smallest scale of pictures during motion: a factor on each side.
+/// Smallest scale of pictures while the view moves: a factor on each side.
 const LEAST_SCALE: f64 = 0.2;
-/// Messages that the panel keeps.
+/// Number of messages that the panel keeps.
 const MESSAGES: usize = 5;
 
 /// A line for the panel.
@@ -49,13 +49,13 @@ pub(crate) struct App {
     pub(crate) given: Option<GivenCameras>,
     pub(crate) models: [Option<Arc<OpenModel>>; 2],
     pub(crate) jobs: [Option<Job>; 2],
-    /// Jobs with an id up to this one open files that the command line names. The program fails if they fail.
+    /// Largest id of a job that opens a file named on the command line. If such a job fails, the program fails.
     pub(crate) required: u64,
-    /// The last id given to a job and to the model that it makes.
+    /// Last id given to a job and to its model.
     pub(crate) last_id: u64,
     pub(crate) notifier: Notifier,
     finished: Receiver<FinishedJob>,
-    /// Errors that the graphics driver reports. They may come at any time and on any thread.
+    /// Errors that the graphics driver reports, at any time and on any thread.
     driver_errors: Receiver<String>,
     pub(crate) render_thread: RenderThread,
     pub(crate) presenter: Arc<Presenter>,
@@ -64,11 +64,11 @@ pub(crate) struct App {
     pub(crate) score: Option<Score>,
     /// Whether the render thread is drawing a view.
     drawing: bool,
-    /// The last view that could not be drawn. It is not requested again.
+    /// Last view that could not be drawn. It is not requested again.
     failed: Option<View>,
-    /// Number of screenshots requested and not saved yet.
+    /// Number of screenshots that were requested and are not saved yet.
     pub(crate) saving: usize,
-    /// Scale of pictures during motion: a factor on each side.
+    /// Scale of pictures while the view moves: a factor on each side.
     scale: f64,
     last_move: Option<Instant>,
     /// Width and height of the area for the picture, in pixels.
@@ -81,7 +81,7 @@ pub(crate) struct App {
     scripted: bool,
     /// Whether the window closes after this frame.
     pub(crate) quit: bool,
-    /// Takes the errors that the program ends with; the first counts.
+    /// Sender of the errors with which the program ends. The first error counts.
     failures: Sender<Error>,
 }
 
@@ -100,7 +100,7 @@ impl App {
         let (errors, driver_errors) = channel();
         let wake_window = Arc::clone(&wake);
         graphics.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            // There is no receiver after the window has closed.
+            // After the window has closed there is no receiver.
             let _ = errors.send(error.to_string());
             wake_window();
         }));
@@ -195,7 +195,7 @@ impl App {
         self.state.set_open([0, 1].map(|i| self.models[i].is_some()));
     }
 
-    /// Moves to the first camera of the camera file, or of an orbit around the first model.
+    /// Chooses the first camera of the camera file, or of an orbit around the first model.
     pub(crate) fn reset_cameras(&mut self) {
         let Some(model) = self.models.iter().flatten().next().cloned() else { return };
         let (cameras, given) = match self.given_cameras(&model) {
@@ -272,7 +272,7 @@ impl App {
         }
     }
 
-    /// Adapts the scale of pictures during motion to the time that `frame` took.
+    /// Adapts the scale of pictures during motion to the time of `frame`.
     fn adapt_scale(&mut self, frame: &Frame) {
         let by = (MOVING_BUDGET / frame.milliseconds.max(1.0)).sqrt();
         self.scale = (frame.scale * by).clamp(LEAST_SCALE, 1.0);
@@ -295,7 +295,7 @@ impl App {
         Some(View { camera, options: self.state.options(), models: self.open_ids(needs)? })
     }
 
-    /// Returns the ids of the open models of those that are needed; `None` if there are none.
+    /// Returns the ids of the open models among those that are needed; `None` if none of these is open.
     pub(crate) fn open_ids(&self, needs: [bool; 2]) -> Option<[Option<u64>; 2]> {
         let ids = [0, 1].map(|i| self.models[i].as_ref().filter(|_| needs[i]).map(|m| m.id));
         ids.iter().any(Option::is_some).then_some(ids)
@@ -306,11 +306,11 @@ impl App {
         self.frame.as_ref().is_some_and(|frame| frame.scale >= 1.0 && frame.view.covers(view))
     }
 
-    /// Requests the wanted view if the frame on screen is another one.
+    /// Requests the wanted view if the frame on screen is of another view.
     fn request_frame(&mut self, context: &egui::Context) {
         let moving = self.is_moving();
         if moving {
-            // A frame after the motion has ended draws in full resolution.
+            // A frame after the end of the motion draws in full resolution.
             context.request_repaint_after(REST);
         }
         let Some(view) = self.wanted_view() else { return };
@@ -325,7 +325,7 @@ impl App {
         }
     }
 
-    /// Returns whether everything requested is done.
+    /// Returns whether everything that was requested is done.
     fn is_settled(&self) -> bool {
         let drawn = self.wanted_view().is_none_or(|view| self.shows(&view));
         drawn && !self.drawing && self.saving == 0 && self.jobs.iter().all(Option::is_none)
@@ -370,7 +370,7 @@ impl App {
     }
 }
 
-/// Returns what draws, and the error of the GPU if the CPU draws because the GPU failed.
+/// Returns the renderer of the scenes, and the error of the GPU if the CPU draws because the GPU failed.
 fn renderer(device: Device, graphics: &RenderState) -> Result<(Box<dyn SceneRenderer>, Option<Error>)> {
     let on_gpu = || {
         let (device, queue) = (graphics.device.clone(), graphics.queue.clone());
@@ -404,7 +404,7 @@ impl eframe::App for App {
         if self.scripted && !self.quit && self.is_settled() {
             match self.script.pop_front() {
                 Some(command) => self.handle(command),
-                // The script has ended; later errors are shown instead of ending the program.
+                // The script has ended. Later errors are shown and do not end the program.
                 None => self.scripted = false,
             }
             context.request_repaint();

@@ -7,7 +7,7 @@ use crate::pose::Pose;
 
 /// Smallest angle between the view direction and the vertical, in radians.
 const POLE: f64 = 0.02;
-/// Smallest distance of the pivot, in scene radii. Moving nearer pushes the pivot ahead.
+/// Smallest distance of the pivot, in scene radii. If the camera moves nearer, the pivot is moved ahead.
 const NEAREST: f64 = 0.02;
 /// Smallest distance of the pivot of a new controller, in scene radii.
 const SHORTEST: f64 = 0.2;
@@ -15,9 +15,9 @@ const SHORTEST: f64 = 0.2;
 /// The ball that holds most of a scene, and its upward direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneBounds {
-    /// Its middle, in world units.
+    /// Centre of the ball, in world units.
     pub centre: DVec3,
-    /// In world units, above 0.
+    /// Radius of the ball, in world units, above 0.
     pub radius: f64,
     /// Distance of the near plane of free views, in world units, above 0.
     pub near: f32,
@@ -26,16 +26,17 @@ pub struct SceneBounds {
 }
 
 impl SceneBounds {
-    /// Returns the bounds of a scene whose bulk, as [`lexisplat_render::bulk`] returns it, is the ball `(centre,
-    /// radius)`, with the `near` plane of free views ([`lexisplat_render::near_plane`]). Up is that of the `given` cameras;
-    /// generated ones, which say nothing about it, are not given.
+    /// Returns the bounds of a scene. The ball `(centre, radius)` is the scene's bulk, as returned by
+    /// [`lexisplat_render::bulk`]. `near` is the distance of the near plane of free views
+    /// ([`lexisplat_render::near_plane`]). Up is the upward direction of the `given` cameras. Generated cameras must not
+    /// be passed, because they do not tell the scene's upward direction.
     #[must_use]
     pub fn new((centre, radius): ([f64; 3], f64), near: f32, given: &[Camera]) -> Self {
         Self { centre: DVec3::from_array(centre), radius, near, up: Self::up_of(given) }
     }
 
-    /// Returns the mean upward direction of `cameras`. Returns world -y, which is up in most scenes trained from
-    /// COLMAP's cameras, if there are none or they do not agree.
+    /// Returns the mean upward direction of `cameras`. If there are none or their directions differ much, returns world
+    /// -y, which is up in most scenes trained from COLMAP's cameras.
     #[must_use]
     pub fn up_of(cameras: &[Camera]) -> DVec3 {
         let sum: DVec3 = cameras.iter().map(|c| -column(c, 1)).sum();
@@ -61,7 +62,8 @@ pub struct CameraController {
 }
 
 impl CameraController {
-    /// Returns a controller with the view of `camera`. Its pivot is as far ahead as the scene's centre.
+    /// Returns a controller with the view of `camera`. The distance of its pivot is the distance of the scene's centre
+    /// along the view.
     #[must_use]
     pub fn at(camera: &Camera, bounds: SceneBounds) -> Self {
         let position = DVec3::from_array(camera.position.map(f64::from));
@@ -86,7 +88,7 @@ impl CameraController {
         Self { position, axes, distance: pose.distance, focal: pose.focal, near: bounds.near, bounds }
     }
 
-    /// Returns the place of the camera.
+    /// Returns the pose of the camera.
     #[must_use]
     pub fn pose(&self) -> Pose {
         Pose::of(self.position, self.axes, self.distance, self.focal)
@@ -112,11 +114,11 @@ impl CameraController {
     fn clamped_pitch(&self, pitch: f64) -> f64 {
         let most = std::f64::consts::FRAC_PI_2 - POLE;
         let elevation = (-self.axes.z_axis.dot(self.bounds.up)).clamp(-1.0, 1.0).asin();
-        // A camera that is already beyond the limit may come back, but not go further.
+        // A camera that is beyond the limit may move back, but not further beyond it.
         (elevation + pitch).clamp(elevation.min(-most), elevation.max(most)) - elevation
     }
 
-    /// Turns the scene around the pivot, as if it were dragged to the right and down. Angles are in radians.
+    /// Turns the scene around the pivot, as if the scene were dragged to the right and down. Angles are in radians.
     pub fn orbit(&mut self, right: f64, down: f64) {
         let pivot = self.pivot();
         self.look(right, down);
@@ -130,28 +132,28 @@ impl CameraController {
         self.turn(self.axes.y_axis.cross(self.axes.z_axis), -down);
     }
 
-    /// Moves the camera so that the pivot moves on the picture to the right and down. Lengths are in units of the
+    /// Moves the camera so that the pivot moves to the right and down on the picture. Lengths are in units of the
     /// picture's shorter side.
     pub fn pan(&mut self, right: f64, down: f64) {
         let scale = self.distance / self.focal;
         self.position -= (self.axes.x_axis * right + self.axes.y_axis * down) * scale;
     }
 
-    /// Multiplies the distance of the pivot by `factor` by moving towards it or away from it.
+    /// Multiplies the distance of the pivot by `factor`: moves the camera towards the pivot or away from it.
     pub fn dolly(&mut self, factor: f64) {
         let step = self.distance * (1.0 - factor);
         self.position += self.axes.z_axis * step;
         self.distance = (self.distance - step).max(NEAREST * self.bounds.radius);
     }
 
-    /// Moves by `step` scene radii to the right, up and forward. Up is the scene's.
+    /// Moves the camera by `step` scene radii to the right, up and forward. Up is the scene's upward direction.
     pub fn fly(&mut self, step: DVec3) {
         let along = self.axes.x_axis * step.x + self.bounds.up * step.y + self.axes.z_axis * step.z;
         self.position += along * self.bounds.radius;
     }
 
-    /// Moves the camera sideways so that `point`, in world units, becomes the pivot. The direction of the view and
-    /// the camera's distance from the point stay. A point that is not finite changes nothing.
+    /// Moves the camera sideways so that `point`, in world units, becomes the pivot. The direction of the view and the
+    /// distance from the point do not change. A point that is not finite changes nothing.
     pub fn focus(&mut self, point: DVec3) {
         if point.is_finite() {
             self.distance = point.distance(self.position).max(NEAREST * self.bounds.radius);
@@ -159,10 +161,10 @@ impl CameraController {
         }
     }
 
-    /// Moves the camera so that the ball of [`SceneBounds`] touches the sides of a square picture. Its centre becomes
-    /// the pivot. The direction of the view stays.
+    /// Moves the camera so that the ball of [`SceneBounds`] touches the sides of a square picture. The ball's centre
+    /// becomes the pivot. The direction of the view does not change.
     pub fn frame(&mut self) {
-        // The sine of half the angle of view is 1/2 over the root of 1/4 and the squared focal length.
+        // The sine of half the angle of view is `0.5 / sqrt(0.25 + focal^2)`.
         self.distance = self.bounds.radius * (1.0 + 4.0 * self.focal * self.focal).sqrt();
         self.position = self.bounds.centre - self.axes.z_axis * self.distance;
     }

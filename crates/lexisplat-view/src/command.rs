@@ -1,4 +1,4 @@
-//! All commands of the viewer. Keys, buttons, dropped files, scripts and links give them.
+//! All commands of the viewer. They come from keys, buttons, dropped files, scripts and links.
 
 use std::path::PathBuf;
 
@@ -10,14 +10,14 @@ use crate::pose::Pose;
 /// The place of one of the two models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Slot {
-    /// The original, if there are two.
+    /// The original, if two models are open.
     First,
-    /// What is compared with it.
+    /// The model that is compared with the original.
     Second,
 }
 
 impl Slot {
-    /// Both, in order.
+    /// Both slots, in order.
     pub const BOTH: [Self; 2] = [Self::First, Self::Second];
 
     /// Returns the index in arrays of two.
@@ -26,7 +26,7 @@ impl Slot {
         self as usize
     }
 
-    /// Returns the other one.
+    /// Returns the other slot.
     #[must_use]
     pub fn other(self) -> Self {
         match self {
@@ -36,16 +36,16 @@ impl Slot {
     }
 }
 
-/// How the models are shown.
+/// The arrangement of the models' pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mode {
-    /// One of the models.
+    /// One of the models alone.
     One(Slot),
     /// Both models, the first on the left.
     SideBySide,
-    /// The first model left of a line, the second right of it.
+    /// The first model left of a line, and the second model right of it.
     Wipe,
-    /// The amplified absolute difference.
+    /// The amplified absolute difference of both pictures.
     Difference,
 }
 
@@ -78,7 +78,7 @@ impl Mode {
         }
     }
 
-    /// Returns which models the mode needs a picture of.
+    /// Returns for each model whether the mode needs its picture.
     #[must_use]
     pub fn needs(self) -> [bool; 2] {
         match self {
@@ -111,13 +111,13 @@ impl std::fmt::Display for Quality {
 pub enum Command {
     /// Chooses the camera with this index, from 0.
     Camera(usize),
-    /// Chooses the camera this many places after the current one; the first follows the last.
+    /// Moves by this number of places in the list of cameras. The first camera follows the last.
     StepCamera(isize),
-    /// Moves the free camera here.
+    /// Moves the free camera to this pose.
     View(Pose),
     /// Returns to the initial view.
     Reset,
-    /// Moves the free camera so that the whole scene is in the picture, in the direction that it looks.
+    /// Moves the free camera so that the whole scene is in the picture. The direction of the view does not change.
     Frame,
     /// Orbits to the right and down, in degrees.
     Orbit([f64; 2]),
@@ -125,7 +125,7 @@ pub enum Command {
     Mode(Mode),
     /// Shows the other model alone.
     Flip,
-    /// Moves the wipe's line: 0 is the left edge, 1 the right.
+    /// Moves the wipe's line: 0 is the left edge, 1 the right edge.
     Split(f32),
     /// Sets the factor on differences.
     Gain(f32),
@@ -139,7 +139,7 @@ pub enum Command {
     Open(PathBuf, Slot),
     /// Opens dropped files.
     Drop {
-        /// The files.
+        /// The dropped files.
         paths: Vec<PathBuf>,
         /// Whether a single scene becomes the first model.
         first: bool,
@@ -148,11 +148,11 @@ pub enum Command {
     Compress(Quality),
     /// Exchanges the models.
     Swap,
-    /// Saves the picture to this file, or to one with a generated name.
+    /// Saves the picture to this file, or to a file with a generated name.
     Screenshot(Option<PathBuf>),
     /// Shows or hides the panel.
     Panel,
-    /// Prints what is shown as a JSON object.
+    /// Prints the state of the view as a JSON object.
     Report,
     /// Closes the window.
     Quit,

@@ -1,4 +1,4 @@
-//! The effects of commands on files, jobs and pictures. `State` handles the others.
+//! The effects of commands on files, jobs and pictures. `State` handles the other commands.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -15,11 +15,11 @@ use crate::given_cameras::GivenCameras;
 use crate::models;
 use crate::render_thread::{RenderRequest, Score, View};
 
-/// Largest number tried in a screenshot's file name.
+/// Largest number tried in the file name of a screenshot.
 const MOST_NAMES: u32 = 100_000;
 
 impl App {
-    /// Carries out `command`. The panel shows its error, if there is one.
+    /// Carries out `command`. The panel shows the error if it fails.
     pub(crate) fn handle(&mut self, command: Command) {
         if let Err(error) = self.try_handle(command) {
             self.show_error(error);
@@ -92,7 +92,7 @@ impl App {
     }
 
     fn swap(&mut self) {
-        // A running job keeps the slot that it was started for.
+        // A running job keeps the slot for which it was started.
         if self.jobs.iter().all(Option::is_none) {
             let [first, second] = self.models.clone();
             self.set_model(Slot::First, second);
@@ -136,7 +136,7 @@ impl App {
         format!("{text}.png")
     }
 
-    /// Prints what is shown as a JSON object.
+    /// Prints the state of the view as a JSON object.
     fn report(&self) -> Result<()> {
         let models: Vec<_> = self
             .models

@@ -1,18 +1,18 @@
-//! Drawing an arrangement of pictures to memory instead of the screen.
+//! Draws an arrangement of pictures to memory instead of the screen.
 
 use lexisplat_render::gpu::readback;
 
 use crate::error::{Error, Result};
 use crate::present::{Composition, Presenter};
 
-/// Bytes that rows of a texture are padded to when copied to a buffer.
+/// Alignment of the rows of a texture in a buffer, in bytes.
 const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
-/// Bytes of a pixel.
+/// Number of bytes of a pixel.
 const PIXEL: u32 = 4;
 /// A format without sRGB encoding, because the pictures are sRGB already.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-/// Width, height and pixels row by row.
+/// A picture: width, height, and pixels row by row.
 pub type Rgb8Image = (u32, u32, Vec<[u8; 3]>);
 
 /// Draws arrangements off screen with the shader of the window.
@@ -23,7 +23,7 @@ pub struct Composer {
 }
 
 impl Composer {
-    /// Returns what draws on `device`, whose queue is `queue`.
+    /// Returns a composer on `device`, whose queue is `queue`.
     #[must_use]
     pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         Self { presenter: Presenter::new(device, FORMAT), queue }
@@ -38,7 +38,7 @@ impl Composer {
         Ok(image(size, &readback::read_async(&target, target.size()).await?))
     }
 
-    /// The same, which blocks.
+    /// Draws like [`Self::compose_async`], and blocks.
     ///
     /// # Errors
     /// As [`Self::compose_async`].
@@ -108,12 +108,12 @@ impl Composer {
     }
 }
 
-/// Returns the bytes of a row of `width` pixels in a buffer.
+/// Returns the number of bytes of a padded row of `width` pixels in a buffer.
 fn row_bytes(width: u32) -> u32 {
     (width * PIXEL).next_multiple_of(ROW)
 }
 
-/// Returns the picture of padded rows.
+/// Returns the picture in padded rows.
 fn image((width, height): (u32, u32), bytes: &[u8]) -> Rgb8Image {
     let pixels = bytes
         .chunks_exact(row_bytes(width) as usize)

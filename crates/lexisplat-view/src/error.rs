@@ -17,15 +17,15 @@ pub enum Error {
     #[cfg(feature = "window")]
     #[error(transparent)]
     Eval(#[from] lexisplat_compress::Error),
-    /// There is no display to open a window on.
+    /// There is no display for a window.
     #[error("no display: neither DISPLAY nor WAYLAND_DISPLAY is set")]
     NoDisplay,
-    /// There is nothing to draw the window with: no graphics adapter, and no OpenGL.
+    /// There is no graphics adapter and no OpenGL for the window.
     #[error(
         "nothing was found to draw a window with: no graphics adapter of Vulkan, Metal or DX12, and no OpenGL"
     )]
     NoAdapter,
-    /// The system did not open the window or start a thread.
+    /// The operating system did not open the window or start a thread.
     #[error("cannot open a window: {0}")]
     Window(String),
     /// The graphics device failed.

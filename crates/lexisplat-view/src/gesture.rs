@@ -1,33 +1,33 @@
-//! What a mouse, a wheel, fingers and held keys do to the free camera, the same in every viewer.
+//! The effects of a mouse, a wheel, fingers and held keys on the free camera. They are the same in every viewer.
 //!
-//! Lengths on the picture are in units of its shorter side, so that a gesture means the same at every size.
+//! Lengths on the picture are in units of its shorter side, so that a gesture has the same effect at every size.
 
 use glam::DVec3;
 
 use crate::state::State;
 
-/// Angle of orbiting for a drag across the picture's shorter side, in radians.
+/// Angle of orbiting by a drag across the picture's shorter side, in radians.
 const ORBIT: f64 = std::f64::consts::PI;
-/// Angle of looking around for the same drag, in radians.
+/// Angle of looking around by such a drag, in radians.
 const LOOK: f64 = 1.0;
 /// Factor on the distance of the pivot for one point of scrolling.
 const WHEEL: f64 = 0.998;
-/// Most points of one scroll.
+/// Largest number of points of one scroll.
 const MOST_POINTS: f64 = 1000.0;
 /// Longest step of a flight, in seconds, however long the last frame took.
 const LONGEST_STEP: f64 = 0.1;
-/// Speed of a flight in scene radii a second, and the factor on it of a fast one.
+/// Speed of a flight, in scene radii per second, and the factor for a fast flight.
 const SPEED: f64 = 0.6;
 const FAST: f64 = 4.0;
 
-/// What a drag does.
+/// The effect of a drag.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Drag {
-    /// Turns the scene around the pivot: the main button, or one finger.
+    /// Turns the scene around the pivot: with the main button, or one finger.
     Orbit,
-    /// Moves the scene along: the second button or shift, or two fingers.
+    /// Moves the scene along: with the second button or shift, or two fingers.
     Pan,
-    /// Turns the view around the camera: the main button with ctrl.
+    /// Turns the view around the camera: with the main button and ctrl.
     Look,
 }
 
@@ -43,15 +43,15 @@ impl State {
         }
     }
 
-    /// Moves the free camera nearer by so many points of scrolling (CSS pixels in a browser), or farther if they are
-    /// below 0. A browser's `deltaY` is below 0 where this is above.
+    /// Moves the free camera nearer by `points` points of scrolling (CSS pixels in a browser), or away if `points` is
+    /// below 0. A browser's `deltaY` has the opposite sign.
     pub fn scroll(&mut self, points: f64) {
         if let Some(controller) = self.free_camera().filter(|_| points.is_finite()) {
             controller.dolly(WHEEL.powf(points.clamp(-MOST_POINTS, MOST_POINTS)));
         }
     }
 
-    /// Makes `point`, in world units, the pivot of the free camera, and its picture's middle: see
+    /// Makes `point`, in world units, the pivot of the free camera and the middle of its picture. See
     /// [`CameraController::focus`](crate::CameraController::focus).
     pub fn focus(&mut self, point: DVec3) {
         if let Some(controller) = self.free_camera() {
@@ -59,8 +59,8 @@ impl State {
         }
     }
 
-    /// Flies for so many seconds in the direction of [`keys::flight`](crate::keys::flight). Steps longer than 0.1
-    /// seconds count as that.
+    /// Flies for `seconds` in a direction of [`keys::flight`](crate::keys::flight). Steps longer than 0.1 seconds count
+    /// as 0.1 seconds.
     pub fn fly(&mut self, direction: DVec3, seconds: f64, fast: bool) {
         let speed = SPEED * if fast { FAST } else { 1.0 };
         if direction != DVec3::ZERO

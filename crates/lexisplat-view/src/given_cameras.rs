@@ -1,4 +1,4 @@
-//! The cameras of a file that the user named.
+//! The cameras of a file named by the user.
 
 use std::path::Path;
 
@@ -16,8 +16,8 @@ pub(crate) struct GivenCameras {
 }
 
 impl GivenCameras {
-    /// Reads the cameras of `file` that `split` lets through, at most `max_width` pixels wide, with the near plane `near` or that
-    /// of the file, for a scene without an offset.
+    /// Reads the cameras of `file` that `split` lets through, for a scene without an offset. Pictures are at most
+    /// `max_width` pixels wide. The near plane is `near`, or that of the file.
     pub(crate) fn read(file: &Path, split: SplitFilter, max_width: u32, near: Option<f32>) -> Result<Self> {
         let (cameras, max_width) = (Some(file.to_path_buf()), max_width.max(1));
         let options = ViewOptions { cameras, split, max_width, near, ..ViewOptions::default() };
@@ -25,8 +25,8 @@ impl GivenCameras {
         Ok(Self { options, cameras })
     }
 
-    /// Returns the cameras for a scene whose positions are relative to `offset`. The file is read again where the offset
-    /// is another than before, because its positions are more precise than those of cameras.
+    /// Returns the cameras for a scene whose positions are relative to `offset`. If the offset has changed, the file is
+    /// read again, because its positions are more precise than those of cameras.
     pub(crate) fn relative_to(&mut self, offset: Option<Offset>) -> Result<&[Camera]> {
         if offset != self.options.offset {
             let options = ViewOptions { offset, ..self.options.clone() };

@@ -1,15 +1,15 @@
-//! The effects of keys, which are named by their text, such as `]`, `1`, `Space` or `R`.
+//! The effects of keys. Keys are named by their text, such as `]`, `1`, `Space` or `R`.
 
 use glam::DVec3;
 
 use crate::command::{Command, Mode};
 
-/// Factor of one press on the amplification of differences.
+/// Factor on the amplification of differences for one press of a key.
 const GAIN_STEP: f32 = 1.5;
 /// The keys that fly right, left, up, down, forward and back while they are held.
 pub const FLIGHT_KEYS: [&str; 6] = ["D", "A", "E", "Q", "W", "S"];
 
-/// Keys and gestures with their effects, for a table of them.
+/// Keys and gestures with their effects, for display as a table.
 pub const HELP: [(&str, &str); 13] = [
     ("drag", "orbit"),
     ("right or shift drag", "pan"),
@@ -26,9 +26,9 @@ pub const HELP: [(&str, &str); 13] = [
     ("P, H", "screenshot, hide this panel"),
 ];
 
-/// Returns the command of the key named `name`, if it has one. Names are those of scripts and of a browser's
-/// `KeyboardEvent.key`: the key's text, with letters in either case and `Space` or a space for the space bar. `=` is
-/// the key of `+`.
+/// Returns the command of the key named `name`; `None` if the key has no command. Names are those of scripts and of a
+/// browser's `KeyboardEvent.key`: the text of the key, with letters in either case, and `Space` or a space for the space
+/// bar. `=` is the same key as `+`.
 #[must_use]
 pub fn command_of_key(name: &str) -> Option<Command> {
     let is = |letter: &str| name.eq_ignore_ascii_case(letter);
@@ -52,15 +52,15 @@ pub fn command_of_key(name: &str) -> Option<Command> {
     })
 }
 
-/// Returns the direction of a flight: right, up and forward, each -1 to 1. `held` says whether one of [`FLIGHT_KEYS`]
-/// is held.
+/// Returns the direction of a flight: right, up and forward, each from -1 to 1. `held` tells whether one of
+/// [`FLIGHT_KEYS`] is held.
 #[must_use]
 pub fn flight(held: impl Fn(&str) -> bool) -> DVec3 {
     let [right, left, up, down, forward, back] = FLIGHT_KEYS.map(|key| i8::from(held(key)));
     DVec3::new(f64::from(right - left), f64::from(up - down), f64::from(forward - back))
 }
 
-/// The same for the window.
+/// The same functions for keys of the window.
 #[cfg(feature = "window")]
 pub(crate) mod window {
     use eframe::egui::{Key, Modifiers};

@@ -1,23 +1,7 @@
-//! A viewer of one or two 3D Gaussian Splatting scenes: its commands and state, and a window for them.
+//! A viewer of one or two 3D Gaussian Splatting scenes: its commands, its state, and a window.
 //!
-//! The core knows no window. Keys, gestures, scripts and links give [`Command`]s to one [`State`], which says what is
-//! shown and from where. It is all that is left without the default feature `window`, and compiles for a browser too.
-//! With the feature `gpu`, `Presenter` shows one or two pictures on any surface of wgpu, and `Composer` saves them.
-//!
-//! With the feature `window`, `run` opens the window and returns when it is closed. Buttons and dropped files give
-//! commands as well. A thread of its own draws the pictures, so that the window responds however long a picture
-//! takes.
-//!
-//! | module | purpose |
-//! |---|---|
-//! | `command`, [`keys`], [`script`] | all commands; their keys; their words in scripts |
-//! | `state` | what is shown and from where |
-//! | `camera_controller`, `gesture` | orbiting, panning and flying; what mouse, fingers and held keys do |
-//! | `pose`, `link` | the free camera's place as text; a link to the very view |
-//! | `picture`, `present`, `compose` | with `gpu`: one or two pictures on screen, or in memory |
-//! | `models` | with `window`: reading and compressing on threads of their own |
-//! | `scene_renderer`, `render_thread` | with `window`: drawing by the GPU or the CPU; the thread that does it |
-//! | `app`, `command_handlers`, `viewport`, `present_callback`, `panel` | the window, its commands, its picture, its controls |
+//! The core is independent of windows. Keys, gestures, scripts and links make [`Command`]s. A [`State`] applies them and holds what
+//! is shown and from where:
 //!
 //! ```
 //! use lexisplat_render::Camera;
@@ -50,6 +34,23 @@
 //! assert_eq!(state.link(), link);
 //! # Ok::<(), lexisplat::Error>(())
 //! ```
+//!
+//! Without the default feature `window` the crate has this core alone, which also compiles for a browser. With the feature `gpu`,
+//! `Presenter` shows one or two pictures on any surface of wgpu, and `Composer` composes them in memory.
+//!
+//! With the feature `window`, `run` opens the window and returns when the window is closed. Buttons and dropped files make commands
+//! as well. A thread of its own draws the pictures, so that the window responds however long a picture takes.
+//!
+//! | module | purpose |
+//! |---|---|
+//! | `command`, [`keys`], [`script`] | all commands; their keys; their words in scripts |
+//! | `state` | what is shown and from where |
+//! | `camera_controller`, `gesture` | orbiting, panning and flying; the effect of mouse, fingers and held keys |
+//! | `pose`, `link` | the place and direction of the free camera as text; a link to exactly the view shown |
+//! | `picture`, `present`, `compose` | with `gpu`: one or two pictures on screen, or in memory |
+//! | `models` | with `window`: reading and compressing on threads of their own |
+//! | `scene_renderer`, `render_thread` | with `window`: drawing by the GPU or the CPU, and its thread |
+//! | `app`, `command_handlers`, `viewport`, `present_callback`, `panel` | the window, its commands, its picture, its controls |
 
 #[cfg(feature = "window")]
 mod app;
@@ -95,7 +96,7 @@ pub use command::{Command, Mode, Quality, Slot};
 pub use compose::{Composer, Rgb8Image};
 pub use error::{Error, Result};
 pub use gesture::Drag;
-/// Vectors of three numbers in double precision, as [`SceneBounds`] and [`keys::flight`] have them.
+/// Vectors of three numbers in double precision, used by [`SceneBounds`] and [`keys::flight`].
 pub use glam::DVec3;
 #[cfg(feature = "window")]
 pub use options::Options;

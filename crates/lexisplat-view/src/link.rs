@@ -1,4 +1,4 @@
-//! A link to the very view: what is shown as a short text, for the fragment of an address.
+//! Links to exactly the view shown: the state as a short text, for the fragment of an address.
 
 use std::mem::discriminant;
 
@@ -8,16 +8,16 @@ use crate::command::{Command, Mode};
 use crate::script;
 use crate::state::{GAINS, State};
 
-/// Most bytes of a link that are read. Links of [`State::link`] have at most a few hundred.
+/// Largest number of bytes of a link that is read. Links of [`State::link`] have at most a few hundred.
 const MOST_BYTES: usize = 4096;
 
 impl State {
-    /// Returns what is shown as words of a script, joined by `&`: `view=`, or `camera=` if one of the cameras is
-    /// chosen; `mode=`; `split=` of a wipe or `gain=` of a difference; `degree=`; and `background=`. All their
-    /// characters may stand in the fragment of an address.
+    /// Returns the state of the view as words of a script, joined by `&`: `view=`, or `camera=` if one of the cameras is
+    /// chosen; `mode=`; `split=` of a wipe or `gain=` of a difference; `degree=`; and `background=`. All characters are
+    /// allowed in the fragment of an address.
     ///
-    /// The camera is rounded as [`Pose`](crate::Pose) says; the other numbers are exact. Applied to a state with the
-    /// same models and cameras, the text gives the same view, whose link is the same text.
+    /// The camera is rounded as described at [`Pose`](crate::Pose). The other numbers are exact. If the text is applied
+    /// to a state with the same models and cameras, it gives the same view, and the link of this view is the same text.
     #[must_use]
     pub fn link(&self) -> String {
         let arrangement = self.arrangement();
@@ -40,12 +40,12 @@ impl State {
         words.join("&")
     }
 
-    /// Shows what a text of [`Self::link`] says. What it leaves out stays as it is. Of modes that need a model which is
-    /// not open, the nearest that is possible is shown, so models and cameras should be there before.
+    /// Applies a text of [`Self::link`]. Properties that the text does not mention do not change. If a mode needs a model
+    /// that is not open, the nearest possible mode is chosen, so models and cameras should be set first.
     ///
     /// # Errors
-    /// [`Error::Parameter`] with the word that is not valid, is no part of a link or comes twice. Nothing is changed
-    /// then.
+    /// [`Error::Parameter`] with the word that is not valid, is not allowed in a link or comes twice. Nothing changes in
+    /// this case.
     pub fn apply_link(&mut self, text: &str) -> Result<()> {
         if text.len() > MOST_BYTES {
             return Err(Error::parameter("link", text.len(), format!("at most {MOST_BYTES} bytes")));
@@ -66,7 +66,7 @@ impl State {
         Ok(())
     }
 
-    /// Returns what a link may say instead of `command`, if it may not be a part of it.
+    /// Returns an error if `command` is not allowed in a link. The error tells what is allowed.
     fn check(&self, command: &Command) -> std::result::Result<(), String> {
         let share = |v: &f32| (0.0..=1.0).contains(v);
         let (fits, expected) = match command {

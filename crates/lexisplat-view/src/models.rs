@@ -1,4 +1,4 @@
-//! The two models, which are read and compressed on threads of their own.
+//! The two models. They are read and compressed on threads of their own.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
@@ -15,22 +15,22 @@ use lexisplat_render::{Camera, bulk, near_plane};
 use crate::command::{Quality, Slot};
 use crate::error::{Error, Result};
 
-/// Bytes of a value in a PLY.
+/// Number of bytes of a value in a PLY.
 const PLY_VALUE: u64 = 4;
-/// Values of a Gaussian in INRIA's layout besides SH-rest: position, normal, base colour, opacity, scales,
+/// Number of values of a Gaussian in INRIA's layout, without SH-rest: position, normal, base colour, opacity, scales,
 /// rotation.
 const PLY_VALUES: u64 = 3 + 3 + 3 + 1 + 3 + 4;
 
-/// An open model, with what the panel shows about it.
+/// An open model, with the facts about it that the panel shows.
 #[derive(Debug)]
 pub(crate) struct OpenModel {
-    /// Unique among all models opened.
+    /// Id, unique among all opened models.
     pub(crate) id: u64,
     pub(crate) scene: SceneFile,
     /// The file that the model was read from, if there is one.
     pub(crate) path: Option<PathBuf>,
     pub(crate) layout: String,
-    /// What the file guarantees, if anything.
+    /// The guarantees of the file, if there are any.
     pub(crate) guarantee: Option<String>,
     /// An orbit of generated cameras, for scenes without a camera file.
     pub(crate) orbit: Vec<Camera>,
@@ -45,7 +45,7 @@ pub(crate) struct OpenModel {
 pub(crate) struct OrbitSize {
     pub(crate) views: u16,
     pub(crate) max_width: u32,
-    /// Distance of the near plane, in world units; without it that of the scene's size.
+    /// Distance of the near plane, in world units. `None` chooses a distance that suits the scene's size.
     pub(crate) near: Option<f32>,
 }
 
@@ -81,18 +81,18 @@ impl OpenModel {
         self.scene.scene().len()
     }
 
-    /// Returns the scene with dense SH, if it is no .lexi.
+    /// Returns the scene with dense SH; `None` for a .lexi.
     pub(crate) fn splats(&self) -> Option<&Splats> {
         self.scene.splats()
     }
 
-    /// Returns how many times smaller a compressed model is than `original`, or than its own PLY in INRIA's layout
-    /// if `original` cannot be its source; and a text that says which.
+    /// Returns the ratio of the size of `original` to the size of this compressed model, and a text that describes it. If
+    /// `original` cannot be the source of this model, the size of the model's own PLY in INRIA's layout is used instead.
     pub(crate) fn ratio(&self, original: Option<&Self>) -> Option<(f64, &'static str)> {
         if matches!(self.scene.loaded, Loaded::Ply(_)) || self.scene.bytes == 0 {
             return None;
         }
-        // Pruning may halve the number of Gaussians; beyond that `original` is taken for another scene.
+        // Pruning may halve the number of Gaussians. With fewer, `original` counts as another scene.
         let count = self.gaussians();
         let is_source = |other: &Self| {
             other.splats().is_some() && (count..=count.saturating_mul(2)).contains(&other.gaussians())
@@ -116,7 +116,7 @@ fn dialect(dialect: Dialect) -> String {
     }
 }
 
-/// Returns what a compressed file guarantees, in one line.
+/// Returns the guarantees of a compressed file, in one line.
 fn guarantee(model: &Model, packed: Option<&Packed>) -> Option<String> {
     let record = model.record();
     let mut parts = Vec::new();
@@ -144,7 +144,7 @@ pub(crate) struct JobStep {
     total: u64,
 }
 
-/// Progress of a job: its thread writes it, the panel reads it.
+/// Progress of a job. The thread of the job writes it, and the panel reads it.
 #[derive(Debug, Default)]
 pub(crate) struct JobProgress(Mutex<JobStep>);
 
@@ -158,7 +158,7 @@ impl JobProgress {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the name of the step, and the share of it that is done, 0 to 1, if known.
+    /// Returns the name of the step, and its completed share from 0 to 1 if that is known.
     pub(crate) fn read(&self) -> (String, Option<f32>) {
         let step = self.lock();
         #[expect(clippy::cast_possible_truncation, reason = "0 to 1")]
@@ -189,7 +189,7 @@ impl Progress for JobProgress {
 /// A job that makes a model.
 #[derive(Debug)]
 pub(crate) struct Job {
-    /// Unique among all jobs. A model from another job than the slot's current one is outdated.
+    /// Id, unique among all jobs. A model of another job than the current job of the slot is outdated.
     pub(crate) id: u64,
     pub(crate) name: String,
     pub(crate) progress: Arc<JobProgress>,
@@ -227,8 +227,8 @@ pub(crate) fn open(
     })
 }
 
-/// Starts a job that makes the second model by compressing `original`, which must not be a .lexi. Sensitivity is
-/// measured from `cameras` if there are any, else from generated views.
+/// Starts a job that makes the second model by compressing `original`, which must not be a .lexi. Sensitivity is measured
+/// from `cameras` if there are any, otherwise from generated views.
 pub(crate) fn compress_to(
     id: u64,
     original: Arc<OpenModel>,
@@ -249,7 +249,7 @@ pub(crate) fn compress_to(
     })
 }
 
-/// Compresses `splats` as `lexisplat compress` does with this preset or tolerance.
+/// Compresses `splats` like `lexisplat compress`, with this preset or tolerance.
 fn compressed(
     splats: &Splats,
     name: &str,
@@ -274,7 +274,7 @@ fn compressed(
     Ok(SceneFile::read_bytes(name, &file, &ReadOptions::default())?)
 }
 
-/// Starts a thread that makes the model of `slot` by `work`.
+/// Starts a thread that makes the model of `slot` by calling `work`.
 fn spawn(
     id: u64,
     slot: Slot,
@@ -285,7 +285,7 @@ fn spawn(
     let progress = Arc::new(JobProgress::default());
     let (again, reported, simd) = (notifier.clone(), Arc::clone(&progress), Simd::current());
     let tell = move |notifier: &Notifier, result| {
-        // There is no receiver after the window has closed.
+        // After the window has closed there is no receiver.
         let _ = notifier.sender.send(FinishedJob { id, slot, result });
         (notifier.wake)();
     };

@@ -1,4 +1,4 @@
-//! What the window shows at first.
+//! Options of the window.
 
 use std::path::PathBuf;
 
@@ -7,23 +7,23 @@ use lexisplat::output::OutputGroup;
 use lexisplat_compress::SplitFilter;
 use lexisplat_render::Device;
 
-/// What to show, and the initial settings.
+/// The files to show, and the initial settings.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// One or two scenes: PLY or .lexi.
+    /// One or two scenes, of any format.
     pub files: Vec<PathBuf>,
     /// A file or folder of cameras. Without it the cameras are an orbit around the first scene.
     pub cameras: Option<PathBuf>,
-    /// Which cameras of the file to take.
+    /// The cameras of the file to use.
     pub split: SplitFilter,
     /// Number of views of the orbit; 0 counts as 1.
     pub orbit: u16,
     /// Largest width of a screenshot, in pixels; 0 counts as 1.
     pub max_width: u32,
-    /// Distance of the near plane, in world units, above 0; without it the trainer's for cameras of a file, and that of the
-    /// scene's size for others.
+    /// Distance of the near plane, in world units, above 0. `None` chooses the trainer's distance for cameras of a file,
+    /// and a distance that suits the scene's size for other cameras.
     pub near: Option<f32>,
-    /// Colour behind the scenes, 0 to 1 in each channel.
+    /// Colour behind the scenes, each channel from 0 to 1.
     pub background: [f32; 3],
     /// The device that draws the scenes. The window itself always needs a graphics adapter, which may be software.
     pub device: Device,
@@ -31,7 +31,7 @@ pub struct Options {
     pub overwrite: bool,
     /// Limits on what files may make the program allocate, including files dropped on the window.
     pub limits: Limits,
-    /// Commands to carry out at the start, as [`SCRIPT_WORDS`](crate::SCRIPT_WORDS) describes; may be empty.
+    /// Commands to carry out at the start, in the words of [`SCRIPT_WORDS`](crate::SCRIPT_WORDS); may be empty.
     pub script: String,
     /// The group of all pictures that are saved.
     pub outputs: OutputGroup,

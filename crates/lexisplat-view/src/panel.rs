@@ -19,17 +19,17 @@ const WIDTH: f32 = 304.0;
 const SLIDER: f32 = 130.0;
 /// Space between sections, in points.
 const GAP: f32 = 8.0;
-/// Tolerances on offer, as un-squared L2 norms of a Gaussian's SH.
+/// Tolerances to choose from, as un-squared L2 norms of the error of a Gaussian's SH.
 const TOLERANCES: [f64; 4] = [0.05, 0.1, 0.2, 0.5];
-/// Colours of captions, of errors, and of what matters most.
+/// Colours of captions, of errors, and of the most important figures.
 const QUIET: Color32 = Color32::from_gray(150);
 const WRONG: Color32 = Color32::from_rgb(240, 130, 120);
 const GOOD: Color32 = Color32::from_rgb(140, 205, 255);
-/// Colours behind the panel and behind its cards.
+/// Background colours of the panel and of its cards.
 const BEHIND: Color32 = Color32::from_gray(27);
 const CARD: Color32 = Color32::from_gray(36);
 
-/// Shows the panel and returns the commands that its user gives.
+/// Shows the panel and returns the commands of its user.
 pub(crate) fn show(app: &App, ui: &mut Ui) -> Vec<Command> {
     let mut commands = Vec::new();
     let frame = egui::Frame::new().fill(BEHIND).inner_margin(Margin::same(10));
@@ -226,7 +226,8 @@ fn drawing(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
     if most > ShDegree::ZERO {
         let slider = Slider::new(&mut degree, 0..=most.get()).text("SH degree");
         if ui.add(slider).changed() {
-            // The highest degree means no limit, so that a model of a higher degree opened later is drawn in full.
+            // The highest degree means no limit, so that a model of a higher degree that is opened later is drawn in
+            // full.
             commands.push(Command::Degree(ShDegree::new(degree).ok().filter(|d| *d < most)));
         }
     }

@@ -1,18 +1,18 @@
-//! A picture on the device.
+//! A picture on the graphics device.
 
 use lexisplat_render::Image;
 use lexisplat_render::gpu::readback;
 
 use crate::error::Result;
 
-/// Bytes of a pixel: red, green, blue and 1 as f32.
+/// Number of bytes of a pixel: red, green, blue and 1, each as f32.
 const PIXEL: u64 = size_of::<[f32; 4]>() as u64;
 
 /// A picture in a buffer of the device. Clones share the buffer.
 #[derive(Debug, Clone)]
 pub struct Picture {
-    /// Red, green, blue and 1 as f32 for each of `width * height` pixels, row by row; not clamped. Its usage is at
-    /// least `STORAGE`.
+    /// Red, green, blue and 1, each as f32, for each of `width * height` pixels, row by row; not clamped. The usage of
+    /// the buffer is at least `STORAGE`.
     pub pixels: wgpu::Buffer,
     /// Width in pixels.
     pub width: u32,
@@ -21,8 +21,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Returns a copy of the first `width * height` pixels of `pixels`, which must allow `COPY_SRC`. A renderer reuses
-    /// its own buffer for the next picture.
+    /// Returns a copy of the first `width * height` pixels of `pixels`, which must allow `COPY_SRC`. A copy is needed
+    /// because a renderer reuses its buffer for the next picture.
     #[must_use]
     pub fn copied(
         device: &wgpu::Device,
@@ -44,7 +44,7 @@ impl Picture {
         Self { pixels: copy, width, height }
     }
 
-    /// Returns the picture in memory. Its buffer must allow `COPY_SRC`. Outside of a browser something must poll the
+    /// Copies the picture to memory. Its buffer must allow `COPY_SRC`. Outside of a browser something must poll the
     /// device meanwhile.
     ///
     /// # Errors
@@ -58,7 +58,7 @@ impl Picture {
         Ok(self.image(readback::read_async(&target, size).await?))
     }
 
-    /// The same, which blocks.
+    /// Copies like [`Self::to_image_async`], and blocks.
     ///
     /// # Errors
     /// As [`Self::to_image_async`].

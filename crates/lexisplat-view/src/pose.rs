@@ -1,42 +1,43 @@
-//! Where the free camera is, and its text in links and scripts.
+//! The pose of the free camera, and its text in links and scripts.
 
 use std::fmt;
 
 use glam::{DMat3, DQuat, DVec3};
 
-/// Decimals of a quaternion's components. Half of the last one turns the view by less than 2e-7 radians, below 1/500
-/// of a pixel of a picture 4000 pixels wide.
+/// Number of decimals of a quaternion's components. Half a unit of the last decimal turns the view by less than 2e-7
+/// radians, below 1/500 of a pixel of a picture 4000 pixels wide.
 const ROTATION_DECIMALS: usize = 7;
-/// Significant digits of the pivot's distance and of the focal length.
+/// Number of significant digits of the pivot's distance and of the focal length.
 const DIGITS: usize = 8;
-/// The last decimal of a position is at most this part of the pivot's distance. Half of it moves what is at the pivot
-/// by less than a pixel of a picture 4000 pixels wide moves divided by 1000.
+/// Largest unit of the last decimal of a position, as a share of the pivot's distance. Half of it moves objects at the
+/// pivot by less than 1/1000 of a pixel in a picture 4000 pixels wide.
 const POSITION_PART: f64 = 1e-7;
-/// Most decimals of a position.
+/// Largest number of decimals of a position.
 const MOST_DECIMALS: f64 = 30.0;
-/// Most steps to a quaternion that is the rounded one of itself. Random ones take up to 3.
+/// Largest number of steps to a quaternion that is rounded to itself. Random quaternions take up to 3.
 const STEPS: usize = 16;
-/// Largest difference of a quaternion's length from 1 in a text.
+/// Largest difference from 1 of the length of a quaternion in a text.
 const LENGTH_TOLERANCE: f64 = 1e-2;
-/// Focal lengths in units of the picture's shorter side. Others have no picture in single precision.
+/// Range of focal lengths, in units of the picture's shorter side. Other focal lengths give no picture in single
+/// precision.
 const FOCALS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
-/// Numbers of a text before the optional [`MIRRORED`].
+/// Number of numbers in a text before the optional [`MIRRORED`].
 const NUMBERS: usize = 9;
-/// What follows the numbers of a mirrored camera.
+/// Word after the numbers of a mirrored camera.
 const MIRRORED: &str = "mirrored";
 
-/// Where a free camera is.
+/// The pose of a free camera: its place, direction, pivot and focal length.
 ///
-/// Its text is `X:Y:Z:I:J:K:W:DISTANCE:FOCAL`, with `:mirrored` behind it for a mirrored camera. Positions are rounded
-/// to 1e-7 of the distance or finer, the quaternion to 7 decimals, distance and focal length to 8 digits. The text of
-/// a pose that was read from such a text is the same text.
+/// Its text is `X:Y:Z:I:J:K:W:DISTANCE:FOCAL`, followed by `:mirrored` for a mirrored camera. Positions are rounded to
+/// 1e-7 of the distance or finer, the quaternion to 7 decimals, distance and focal length to 8 digits. The text of a pose
+/// that was read from such a text is the same text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Camera centre in world units.
     pub position: [f64; 3],
     /// Unit quaternion i, j, k, w from camera to world. The camera's axes are right, down and forward.
     pub rotation: [f64; 4],
-    /// Whether the camera's right is negated before the rotation. Some published cameras are so.
+    /// Whether the camera's right axis is negated before the rotation. Some published cameras are mirrored in this way.
     pub mirrored: bool,
     /// Distance of the pivot, which is straight ahead, in world units.
     pub distance: f64,
@@ -52,20 +53,20 @@ impl Pose {
         Self { position: position.to_array(), rotation, mirrored, distance, focal }
     }
 
-    /// Returns the directions right, down and forward in the world, as columns.
+    /// Returns the right, down and forward directions in the world, as columns.
     pub(crate) fn axes(&self) -> DMat3 {
         handed(DMat3::from_quat(DQuat::from_array(self.rotation).normalize()), self.mirrored)
     }
 
-    /// Returns the pose of a text, or `None` if it is not one: a number is missing, is not finite or has no picture in
-    /// single precision, or the quaternion's length is not 1.
+    /// Returns the pose of a text. Returns `None` if a number is missing, is not finite or gives no picture in single
+    /// precision, or if the length of the quaternion is not 1.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let (numbers, mirrored) = match text.strip_suffix(MIRRORED).and_then(|rest| rest.strip_suffix(':')) {
             Some(numbers) => (numbers, true),
             None => (text, false),
         };
-        // One part more than there may be is enough to see that there are too many.
+        // One more part than allowed is enough to see that there are too many.
         let parts = numbers.split(':').take(NUMBERS + 1).map(|part| part.trim().parse().ok());
         let numbers: Vec<f64> = parts.collect::<Option<_>>()?;
         let [x, y, z, i, j, k, w, distance, focal] = <[f64; NUMBERS]>::try_from(numbers).ok()?;
@@ -79,7 +80,7 @@ impl Pose {
     }
 }
 
-/// Returns `axes` with the first one negated if `mirrored`.
+/// Returns `axes`. The first axis is negated if `mirrored` is set.
 fn handed(axes: DMat3, mirrored: bool) -> DMat3 {
     let sign = if mirrored { -1.0 } else { 1.0 };
     DMat3::from_cols(axes.x_axis * sign, axes.y_axis, axes.z_axis)
@@ -88,7 +89,7 @@ fn handed(axes: DMat3, mirrored: bool) -> DMat3 {
 impl fmt::Display for Pose {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let distance = significant(self.distance);
-        // The distance as it is written decides, so that what is read back is written in the same way.
+        // The rounded distance determines the decimals, so that a pose that is read back is written in the same way.
         let place = -(distance * POSITION_PART).log10().floor();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 30; NaN becomes 0")]
         let decimals = place.clamp(0.0, MOST_DECIMALS) as usize;
@@ -103,7 +104,7 @@ impl fmt::Display for Pose {
     }
 }
 
-/// Returns `value` with so many decimals. Zero is never negative. What is not finite stays.
+/// Returns `value` rounded to `decimals` decimals. Zero is never negative. Values that are not finite do not change.
 fn rounded(value: f64, decimals: usize) -> f64 {
     // The text is rounded, because a power of ten is not exact in binary.
     format!("{value:.decimals$}").parse().unwrap_or(value) + 0.0
@@ -114,8 +115,8 @@ fn significant(value: f64) -> f64 {
     format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }
 
-/// Returns a rounded quaternion of the same rotation which, after it is scaled to length 1, is rounded to itself. Its
-/// first component that is not 0, from w on, is above 0.
+/// Returns a rounded quaternion of the same rotation that is rounded to itself after it is scaled to length 1. Its first
+/// component that is not 0, in the order from w on, is above 0.
 fn settled(rotation: [f64; 4]) -> [f64; 4] {
     let round = |q: [f64; 4]| q.map(|v| rounded(v, ROTATION_DECIMALS));
     let mut now = round(rotation);

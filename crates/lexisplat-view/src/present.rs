@@ -1,4 +1,4 @@
-//! Drawing one or two pictures to a window, a canvas or a texture, with one triangle and a shader.
+//! Draws one or two pictures to a window, a canvas or a texture, with one triangle and a shader.
 
 use wgpu::util::DeviceExt;
 
@@ -18,18 +18,18 @@ struct Uniform {
     padding: [f32; 2],
 }
 
-/// Pictures of one size, and their arrangement.
+/// Pictures of the same size, and their arrangement.
 #[derive(Debug, Clone)]
 pub struct Composition {
-    /// What is shown of which.
+    /// Arrangement of the pictures.
     pub arrangement: Arrangement,
     /// The picture of each model.
     pub pictures: [Option<Picture>; 2],
 }
 
 impl Composition {
-    /// Returns the pictures on the left and on the right, which are the same if one model is shown. Returns `None`
-    /// if the arrangement needs a picture that is missing.
+    /// Returns the left and the right picture. They are the same if one model is shown. Returns `None` if the arrangement
+    /// needs a picture that is missing.
     #[must_use]
     pub fn sides(&self) -> Option<[&Picture; 2]> {
         let [first, second] = [0, 1].map(|i| self.pictures[i].as_ref());
@@ -51,7 +51,7 @@ impl Composition {
     }
 }
 
-/// The pipeline for one texture format.
+/// A presenter of pictures: a pipeline for one texture format.
 #[derive(Debug)]
 pub struct Presenter {
     pub(crate) device: wgpu::Device,
@@ -60,8 +60,8 @@ pub struct Presenter {
 }
 
 impl Presenter {
-    /// Returns what draws to targets of `format`. The pictures are sRGB already: a format that encodes what is
-    /// written to it as sRGB gets them decoded, and shows the same.
+    /// Returns a presenter for targets of `format`. The pictures are sRGB already. If the format encodes written values
+    /// as sRGB, the shader decodes the pictures first, so that the same colours are shown.
     #[must_use]
     pub fn new(device: wgpu::Device, format: wgpu::TextureFormat) -> Self {
         let module = device.create_shader_module(wgpu::include_wgsl!("present.wgsl"));
@@ -89,8 +89,8 @@ impl Presenter {
         Self { device, pipeline, encodes: format.is_srgb() }
     }
 
-    /// Returns the bind group that shows `composition`, or `None` if a picture is missing. Both pictures must have
-    /// one size and be on the device of this.
+    /// Returns the bind group that shows `composition`, or `None` if a picture is missing. Both pictures must have the
+    /// same size and be on the presenter's device.
     #[must_use]
     pub fn bind(&self, composition: &Composition) -> Option<wgpu::BindGroup> {
         let [left, right] = composition.sides()?;

@@ -1,13 +1,13 @@
-// One or two pictures on a rectangle of the screen or of a file.
+// Shows one or two pictures in a rectangle of the screen or of a file.
 
 struct Arrangement {
     // Size of each picture in pixels.
     size: vec2<u32>,
-    // 0 the first, 1 side by side, 2 wipe, 3 difference.
+    // 0: the first picture, 1: side by side, 2: wipe, 3: difference.
     mode: u32,
-    // 1 if the target encodes what is written to it as sRGB, which the pictures already are.
+    // 1 if the target encodes written values as sRGB, otherwise 0. The pictures are sRGB already.
     encodes: u32,
-    // Where the wipe's line is, 0 to 1.
+    // Position of the wipe's line, 0 to 1.
     split: f32,
     // Factor on differences.
     gain: f32,
@@ -20,7 +20,7 @@ struct Arrangement {
 
 struct Corner {
     @builtin(position) position: vec4<f32>,
-    // 0 to 1 over the rectangle, from its top left.
+    // Place in the rectangle, from 0 at the top left to 1.
     @location(0) place: vec2<f32>,
 }
 
@@ -31,7 +31,8 @@ fn corner(@builtin(vertex_index) index: u32) -> Corner {
     return Corner(vec4<f32>(place.x * 2.0 - 1.0, 1.0 - place.y * 2.0, 0.0, 1.0), place);
 }
 
-// Pixels closer to a whole one than this are that one: interpolated places are a little off.
+// Distance from a whole pixel below which a place is moved to that pixel, because interpolated places are slightly
+// inexact.
 const SNAP: f32 = 0.005;
 
 fn clipped(colour: vec3<f32>) -> vec3<f32> {
@@ -46,12 +47,12 @@ fn index(x: i32, y: i32) -> u32 {
 }
 
 struct Footprint {
-    // Top left, top right, bottom left, bottom right.
+    // Indices of the pixels: top left, top right, bottom left, bottom right.
     at: vec4<u32>,
     part: vec2<f32>,
 }
 
-// The four pixels around a place of the picture, 0 to 1, and how far it is from the first of them.
+// Returns the four pixels around a place of the picture, 0 to 1, and the distance of the place from the first of them.
 fn footprint(place: vec2<f32>) -> Footprint {
     let pixel = place * vec2<f32>(arrangement.size) - 0.5;
     let near = floor(pixel + SNAP);

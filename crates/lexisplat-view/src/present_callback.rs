@@ -1,4 +1,4 @@
-//! Showing pictures inside egui.
+//! Shows pictures inside egui.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The thread that draws, so that the window never waits for a picture.
+//! The thread that draws. It keeps the window from waiting for pictures.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -20,10 +20,10 @@ use crate::present::Composition;
 use crate::scene_renderer::{DrawnPicture, SceneRenderer};
 use crate::state::Arrangement;
 
-/// Shortest time between two comparisons of pictures during motion.
+/// Shortest time between two comparisons of pictures while the view moves.
 const COMPARE_EVERY: Duration = Duration::from_millis(300);
 
-/// Everything that the pictures of a frame depend on.
+/// All values on which the pictures of a frame depend.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct View {
     /// The camera, at the size of the picture on screen.
@@ -34,7 +34,7 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// Returns whether the pictures of this view include those of `other`.
+    /// Returns whether the pictures of this view include the pictures of `other`.
     pub(crate) fn covers(&self, other: &Self) -> bool {
         let models = self.models.iter().zip(other.models);
         self.camera == other.camera
@@ -48,7 +48,8 @@ impl View {
 pub(crate) enum RenderRequest {
     /// Replaces a model.
     Model(Slot, Option<Arc<OpenModel>>),
-    /// Draws a view with both sides of its pictures multiplied by a scale. Only the latest of such requests is done.
+    /// Draws a view, with both sides of its pictures multiplied by a scale. Only the latest of such requests is carried
+    /// out.
     View(View, f64),
     /// Saves the picture of a view to a file.
     Screenshot { view: View, arrangement: Arrangement, file: PathBuf },
@@ -69,20 +70,20 @@ pub(crate) struct Frame {
     /// Factor on both sides of the pictures.
     pub(crate) scale: f64,
     pub(crate) pictures: [Option<Arc<DrawnPicture>>; 2],
-    /// Time to draw all pictures.
+    /// Time to draw all pictures, in milliseconds.
     pub(crate) milliseconds: f64,
-    /// The second picture compared with the first, if both were drawn and a comparison was due.
+    /// Score of the second picture against the first, if both were drawn and a comparison was due.
     pub(crate) score: Option<Score>,
-    /// Bytes on the device: models, work buffers and these pictures.
+    /// Number of bytes on the device: models, work buffers and these pictures.
     pub(crate) resident_bytes: u64,
 }
 
 /// The result of a [`RenderRequest`].
 #[derive(Debug)]
 pub(crate) enum RenderEvent {
-    /// The frame of a view, or why it could not be drawn.
+    /// The frame of a view, or the error of drawing it.
     Frame(Result<Box<Frame>>),
-    /// The file that a screenshot was saved to, or why it could not be drawn or saved.
+    /// The file of a saved screenshot, or the error of drawing or saving it.
     Saved(Result<PathBuf>),
     /// A model does not fit on the device.
     ModelFailed(Slot, Error),
@@ -91,7 +92,7 @@ pub(crate) enum RenderEvent {
 /// A handle to the render thread. Dropping it ends the thread.
 #[derive(Debug)]
 pub(crate) struct RenderThread {
-    /// `Some` until this is dropped.
+    /// Sender of requests; `Some` until the handle is dropped.
     requests: Option<Sender<RenderRequest>>,
     events: Receiver<RenderEvent>,
     thread: Option<JoinHandle<()>>,
@@ -138,7 +139,7 @@ impl RenderThread {
         Ok(Self { requests: Some(requests), events, thread: Some(thread), name })
     }
 
-    /// Returns whether the thread is running. It ends early only by a panic.
+    /// Returns whether the thread is running. It ends early only after a panic.
     pub(crate) fn is_alive(&self) -> bool {
         self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
@@ -163,13 +164,13 @@ impl Drop for RenderThread {
     fn drop(&mut self) {
         self.requests = None;
         if let Some(thread) = self.thread.take() {
-            // The thread itself has reported a panic.
+            // The thread itself has already reported a panic.
             let _ = thread.join();
         }
     }
 }
 
-/// Removes all views but the last.
+/// Removes all requests for views but the last.
 fn only_the_latest_view(batch: &mut Vec<RenderRequest>) {
     let views = batch.iter().filter(|request| matches!(request, RenderRequest::View(..))).count();
     let mut seen = 0;
@@ -227,7 +228,7 @@ impl RenderWorker {
         let mut score = None;
         if let ([Some(first), Some(second)], true) = (&pictures, due) {
             let images = [self.image(first)?, self.image(second)?];
-            // Colours may overflow to NaN, and such pictures have no score.
+            // Colours may overflow to NaN. Such pictures have no score.
             let decibels = psnr(&images[0], &images[1]).ok();
             score = decibels.map(|found| found.map_or(Score::Identical, Score::Decibels));
             self.last_comparison = Some(Instant::now());
@@ -247,7 +248,8 @@ impl RenderWorker {
         picture.to_image(&self.composer.presenter.device, &self.composer.queue)
     }
 
-    /// Returns the picture of a screenshot: the renderer's own if one model is shown, else the arrangement on screen.
+    /// Returns the picture of a screenshot: the renderer's own picture if one model is shown, otherwise the arrangement
+    /// on screen.
     fn picture(&mut self, view: &View, arrangement: Arrangement) -> Result<Rgb8Image> {
         let pictures = self.draw_models(view, &view.camera)?;
         if let (Mode::One(_), Some(picture)) = (arrangement.mode, pictures.iter().flatten().next()) {

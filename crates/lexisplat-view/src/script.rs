@@ -1,4 +1,4 @@
-//! Scripts: commands as text, carried out one after another.
+//! Scripts: commands as text, which are carried out one after another.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -32,10 +32,10 @@ Words of a script, separated by commas. Each is carried out when the picture of 
   quit                  close the window
 An error ends the script and the program.";
 
-/// The commands still to be carried out.
+/// The remaining commands of a script.
 pub type Script = VecDeque<Command>;
 
-/// Parses the commands of `text`.
+/// Parses the commands of `text`, which are separated by commas.
 ///
 /// # Errors
 /// [`Error::Parameter`] with the word that is not valid.
@@ -43,7 +43,7 @@ pub fn parse(text: &str) -> Result<Script> {
     text.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|text| word("actions", text)).collect()
 }
 
-/// Parses one word. `parameter` is what the error says is wrong.
+/// Parses one word. Errors name `parameter` as the wrong parameter.
 pub(crate) fn word(parameter: &'static str, word: &str) -> Result<Command> {
     let wrong = |expected: &str| Error::parameter(parameter, word, expected);
     let (name, value) = word.split_once('=').map_or((word, None), |(name, value)| (name, Some(value)));

@@ -1,4 +1,4 @@
-//! What is shown and from where, independent of any window.
+//! The state of the view: what is shown and from where. It is independent of windows.
 
 use lexisplat_render::{Camera, RenderOptions};
 
@@ -6,35 +6,35 @@ use crate::camera_controller::{CameraController, SceneBounds, fitted};
 use crate::command::{Command, Mode, Slot};
 use crate::pose::Pose;
 
-/// Amplification of differences: the initial value, which is that of `lexisplat-eval`'s montages, and the range.
+/// Initial amplification of differences, which is that of the montages of `lexisplat-eval`, and its range.
 const GAIN: f32 = 10.0;
 pub(crate) const GAINS: std::ops::RangeInclusive<f32> = 1.0..=100.0;
 
-/// How the models' pictures are arranged on screen.
+/// Arrangement of the models' pictures on screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arrangement {
-    /// What is shown of which model.
+    /// Mode: which models are shown, and how.
     pub mode: Mode,
-    /// Position of the wipe's line: 0 is the left edge, 1 the right.
+    /// Position of the wipe's line: 0 is the left edge, 1 the right edge.
     pub split: f32,
     /// Factor on differences, 1 to 100.
     pub gain: f32,
 }
 
 impl Arrangement {
-    /// Returns the number of pictures next to each other.
+    /// Returns the number of pictures side by side.
     #[must_use]
     pub fn columns(&self) -> u32 {
         if self.mode == Mode::SideBySide { 2 } else { 1 }
     }
 }
 
-/// What is shown and from where.
+/// The state of the view: what is shown and from where.
 #[derive(Debug)]
 pub struct State {
     /// Cameras to step through.
     cameras: Vec<Camera>,
-    /// Whether the cameras come from a file. Else they are a generated orbit, whose picture size is arbitrary.
+    /// Whether the cameras come from a file. Otherwise they are a generated orbit, whose picture size is arbitrary.
     given: bool,
     bounds: SceneBounds,
     /// Index of the camera chosen last.
@@ -52,8 +52,8 @@ pub struct State {
 }
 
 impl State {
-    /// Returns a state without models and cameras. `background` is the colour behind the scenes, 0 to 1 in each
-    /// channel.
+    /// Returns a state without models and cameras. `background` is the colour behind the scenes, each channel from 0 to
+    /// 1.
     #[must_use]
     pub fn new(background: [f32; 3]) -> Self {
         let bounds =
@@ -72,8 +72,8 @@ impl State {
         }
     }
 
-    /// Replaces the cameras and resets the view. With `given` cameras the view is that of the first. Else it is
-    /// that of a free camera in its place, whose picture fills the window.
+    /// Replaces the cameras and resets the view. With `given` cameras the view is that of the first camera. Otherwise it
+    /// is that of a free camera in the place of the first camera, whose picture fills the window.
     pub fn set_cameras(&mut self, cameras: Vec<Camera>, given: bool, bounds: SceneBounds) {
         self.cameras = cameras;
         self.given = given;
@@ -81,7 +81,7 @@ impl State {
         self.reset();
     }
 
-    /// Sets which models are open. The mode becomes a wipe when the second of them is opened.
+    /// Sets which models are open. When the second of the two is opened, the mode becomes a wipe.
     pub fn set_open(&mut self, open: [bool; 2]) {
         if open == [true; 2] && self.open != open {
             self.arrangement.mode = Mode::Wipe;
@@ -120,13 +120,13 @@ impl State {
         self.index
     }
 
-    /// Returns how the pictures are arranged.
+    /// Returns the arrangement of the pictures.
     #[must_use]
     pub fn arrangement(&self) -> Arrangement {
         self.arrangement
     }
 
-    /// Returns how the models are drawn.
+    /// Returns the options of drawing.
     #[must_use]
     pub fn options(&self) -> RenderOptions {
         self.options
@@ -138,7 +138,7 @@ impl State {
         self.panel
     }
 
-    /// Returns the free camera's place, if it is in use.
+    /// Returns the pose of the free camera, if it is in use.
     #[must_use]
     pub fn pose(&self) -> Option<Pose> {
         self.free_camera.as_ref().map(CameraController::pose)
@@ -150,8 +150,8 @@ impl State {
         self.free_camera.is_some()
     }
 
-    /// Returns the free camera, which starts at the present view if it was not in use. Returns `None` if there is no
-    /// camera yet.
+    /// Returns the free camera. If it was not in use, it starts at the present view. Returns `None` if there is no camera
+    /// yet.
     pub fn free_camera(&mut self) -> Option<&mut CameraController> {
         if self.free_camera.is_none() {
             self.free_camera = Some(CameraController::at(self.cameras.get(self.index)?, self.bounds));
@@ -159,7 +159,7 @@ impl State {
         self.free_camera.as_mut()
     }
 
-    /// Carries out `command`. Commands that do not concern the state are ignored.
+    /// Carries out `command`. Commands that have no effect on the state are ignored.
     pub fn apply(&mut self, command: &Command) {
         let count = self.cameras.len();
         match *command {
@@ -212,8 +212,8 @@ impl State {
         }
     }
 
-    /// Returns the camera for an area of `width * height` pixels in the present arrangement: the free camera fills
-    /// it, the others keep their aspect within it. Returns `None` if there is no camera yet.
+    /// Returns the camera for an area of `width * height` pixels in the present arrangement. The free camera fills the
+    /// area, and other cameras keep their aspect within it. Returns `None` if there is no camera yet.
     #[must_use]
     pub fn camera(&self, width: u32, height: u32) -> Option<Camera> {
         let width = (width / self.arrangement.columns()).clamp(1, lexisplat_render::MAX_SIDE);
@@ -227,8 +227,8 @@ impl State {
         Some(camera.resized(width, height))
     }
 
-    /// Returns the camera of a screenshot: the chosen one at its own size, or the free one at its size on screen, at
-    /// most `max_width` pixels wide. Returns `None` if there is no camera yet.
+    /// Returns the camera of a screenshot, at most `max_width` pixels wide: the chosen camera at its own size, or the
+    /// free camera at its size on screen. Returns `None` if there is no camera yet.
     #[must_use]
     pub fn screenshot_camera(&self, width: u32, height: u32, max_width: u32) -> Option<Camera> {
         if self.free_camera.is_none() {
@@ -238,7 +238,7 @@ impl State {
     }
 }
 
-/// Returns `colour` within 0 to 1; what is not finite becomes 0.
+/// Returns `colour` clamped to 0 to 1. Values that are not finite become 0.
 fn clipped(colour: [f32; 3]) -> [f32; 3] {
     colour.map(|v| if v.is_finite() { v.clamp(0.0, 1.0) } else { 0.0 })
 }

@@ -1,4 +1,4 @@
-//! The picture in the window, with its labels, the wipe's line, and the pointer's effects on the view.
+//! The picture in the window, with its labels, the wipe's line, and the effects of the pointer on the view.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::present::Composition;
 use crate::present_callback::PresentCallback;
 use crate::render_thread::Score;
 
-/// Largest distance of the pointer from the wipe's line that it drags, in points.
+/// Largest distance of the pointer from the wipe's line at which it drags the line, in points.
 const GRIP: f32 = 8.0;
 /// Radius of the line's handle, in points.
 const HANDLE: f32 = 7.0;
@@ -59,7 +59,8 @@ impl App {
         });
     }
 
-    /// Returns the arrangement chosen, or the one picture there is if the arrangement needs another.
+    /// Returns the pictures in the chosen arrangement. If the arrangement needs a picture that is missing, returns the
+    /// only picture.
     fn composition(&self) -> Option<Composition> {
         let frame = self.frame.as_ref()?;
         let pictures = frame.pictures.each_ref().map(|drawn| drawn.as_ref().map(|d| d.picture.clone()));
@@ -71,13 +72,13 @@ impl App {
         Some(composition)
     }
 
-    /// Returns the rectangle of the picture: in the middle of `whole`, with corners on whole pixels.
+    /// Returns the rectangle of the picture. It is in the middle of `whole`, and its corners are on whole pixels.
     fn place(&self, composition: &Composition, whole: Rect, per_point: f32) -> Option<Rect> {
         let camera = &self.frame.as_ref()?.view.camera;
         let columns = composition.arrangement.columns();
         let (width, height) = (camera.width * columns, camera.height);
-        // A picture drawn for this area is shown pixel for pixel. One drawn for another area, before the window
-        // changed its size, is scaled until the next one is drawn.
+        // A picture that was drawn for this area is shown pixel for pixel. A picture that was drawn before the window
+        // changed its size is scaled until the next picture is drawn.
         let fills = self.area.0.checked_sub(width).is_some_and(|rest| rest < columns);
         let fits = (fills && height <= self.area.1) || (width <= self.area.0 && height == self.area.1);
         let aspect = f64::from(width) / f64::from(height.max(1));
@@ -172,7 +173,7 @@ fn middle(painter: &egui::Painter, place: Rect, text: &str, colour: Color32) {
     painter.text(place.center(), Align2::CENTER_CENTER, text, FontId::proportional(18.0), colour);
 }
 
-/// Writes text over the picture, inside of its corner `align`, which is at `corner`.
+/// Writes text over the picture. `corner` is the place of its corner `align`; the text lies inside of it.
 fn label(painter: &egui::Painter, corner: Pos2, align: Align2, text: &str) {
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), Color32::WHITE);
     let sign = align.to_sign();
@@ -182,7 +183,7 @@ fn label(painter: &egui::Painter, corner: Pos2, align: Align2, text: &str) {
     painter.galley(inner.min, galley, Color32::WHITE);
 }
 
-/// Returns the whole pixels in `points`.
+/// Returns the number of whole pixels in `points`.
 fn pixels(points: f32, per_point: f32) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 65535")]
     let count = (points * per_point).floor().clamp(0.0, 65_535.0) as u32;

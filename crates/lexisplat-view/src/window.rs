@@ -1,4 +1,4 @@
-//! Opening the window.
+//! Opens the window.
 
 use std::sync::Arc;
 use std::sync::mpsc::channel;
@@ -19,13 +19,13 @@ use crate::script;
 const SIZE: [f32; 2] = [1280.0, 800.0];
 /// Smallest size of the window, in points.
 const LEAST_SIZE: [f32; 2] = [640.0, 400.0];
-/// Graphics interfaces with the precision that the renderer's kernels need; OpenGL lacks it.
+/// Graphics interfaces with the precision that the renderer's kernels need. OpenGL lacks this precision.
 const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 
 /// Opens the window and returns when it is closed.
 ///
-/// Where nothing can run the renderer's kernels, the processor draws, and OpenGL shows its pictures. OpenGL is also there
-/// without any GPU, in software.
+/// If no adapter can run the renderer's kernels, the processor draws, and OpenGL shows its pictures. OpenGL also exists
+/// without a GPU, in software.
 ///
 /// # Errors
 /// [`Error::NoDisplay`] and [`Error::NoAdapter`] if there is no display or nothing that shows pictures on it; errors of
@@ -56,7 +56,7 @@ pub fn run(mut options: Options) -> Result<()> {
         Device::Index(index) => Some(index),
         _ => None,
     };
-    // OpenGL needs to know the display before there is a window.
+    // OpenGL needs to know the display before a window exists.
     let opened = by_opengl.then(|| EventLoop::<eframe::UserEvent>::with_user_event().build()).transpose();
     let event_loop = opened.map_err(|error| Error::Window(error.to_string()))?;
     let mut setup = match &event_loop {
@@ -66,7 +66,7 @@ pub fn run(mut options: Options) -> Result<()> {
         None => egui_wgpu::WgpuSetupCreateNew::without_display_handle(),
     };
     setup.instance_descriptor.backends = if by_opengl { wgpu::Backends::GL } else { backends };
-    // The renderer's kernels compute the arguments of indirect dispatches and clamp them.
+    // The renderer's kernels compute the arguments of indirect dispatches and clamp them, so they need no validation.
     setup.instance_descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     setup.native_adapter_selector = Some(Arc::new(move |adapters, surface| {
         best(adapters, surface, chosen)
@@ -103,7 +103,7 @@ pub fn run(mut options: Options) -> Result<()> {
     }
 }
 
-/// What a device needs that only shows pictures.
+/// Returns the descriptor of a device that only shows pictures.
 fn plain(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
     wgpu::DeviceDescriptor { required_limits: adapter.limits(), ..wgpu::DeviceDescriptor::default() }
 }
@@ -123,8 +123,8 @@ fn adapters(backends: wgpu::Backends) -> usize {
     pollster::block_on(instance.enumerate_adapters(backends)).len()
 }
 
-/// Returns the best adapter that can draw on `surface`; software adapters come last. If `chosen` is an index into
-/// all adapters, best first, returns that one or nothing.
+/// Returns the best adapter that can draw on `surface`. Software adapters come last. If `chosen` is an index into all
+/// adapters, best first, returns only that adapter, or `None`.
 fn best(
     adapters: &[wgpu::Adapter],
     surface: Option<&wgpu::Surface<'_>>,

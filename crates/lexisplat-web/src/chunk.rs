@@ -1,9 +1,10 @@
-//! A decoded chunk, given to JavaScript array by array.
+//! A decoded chunk, which JavaScript reads array by array.
 
 use lexisplat::{Indices, Model, Values};
 use wasm_bindgen::prelude::*;
 
-/// Gaussians that were decoded together. Each array is a copy; JavaScript hands it from a worker without another one.
+/// Gaussians that were decoded together. Each method copies an array. JavaScript passes the array from a worker without
+/// another copy.
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Chunk {
@@ -16,7 +17,7 @@ impl Chunk {
         Self { model, first }
     }
 
-    /// The decoded Gaussians.
+    /// Returns the decoded Gaussians.
     #[must_use]
     pub fn model(&self) -> &Model {
         &self.model
@@ -25,63 +26,63 @@ impl Chunk {
 
 #[wasm_bindgen]
 impl Chunk {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn count(&self) -> usize {
         self.model.len()
     }
 
-    /// The place of the first Gaussian in the scene.
+    /// Returns the place of the first Gaussian in the scene.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn first(&self) -> usize {
         self.first
     }
 
-    /// Centres, three numbers a Gaussian.
+    /// Returns the centres, three numbers for each Gaussian.
     #[must_use]
     pub fn positions(&self) -> Vec<f32> {
         self.model.geometry().positions.as_flattened().to_vec()
     }
 
-    /// Logarithms of standard deviations, three numbers a Gaussian.
+    /// Returns the logarithms of standard deviations, three numbers for each Gaussian.
     #[must_use]
     pub fn scales(&self) -> Vec<f32> {
         self.model.geometry().scales.as_flattened().to_vec()
     }
 
-    /// Quaternions w, x, y, z, not always of norm 1.
+    /// Returns the quaternions w, x, y, z, which need not have norm 1.
     #[must_use]
     pub fn rotations(&self) -> Vec<f32> {
         self.model.geometry().rotations.as_flattened().to_vec()
     }
 
-    /// Opacities before the sigmoid.
+    /// Returns the opacities before the sigmoid.
     #[must_use]
     pub fn opacities(&self) -> Vec<f32> {
         self.model.geometry().opacities.clone()
     }
 
-    /// SH coefficients of degree 0, three numbers a Gaussian.
+    /// Returns the SH coefficients of degree 0, three numbers for each Gaussian.
     #[must_use]
     pub fn dc(&self) -> Vec<f32> {
         self.model.geometry().dc.as_flattened().to_vec()
     }
 
-    /// SH-rest, channel-major for each Gaussian: 45 numbers at degree 3.
+    /// Returns SH-rest, channel-major for each Gaussian: 45 numbers at degree 3.
     #[must_use]
     pub fn dense(&self) -> Vec<f32> {
         self.model.dense_rest()
     }
 
-    /// Nonzeros of each Gaussian. Those of an escaped Gaussian are 0.
+    /// Returns the number of nonzeros of each Gaussian. It is 0 for an escaped Gaussian.
     #[must_use]
     pub fn counts(&self) -> Vec<u8> {
         self.model.codes().counts().to_vec()
     }
 
-    /// The atoms of all nonzeros if the dictionary has at most 256 atoms.
+    /// Returns the atoms of all nonzeros if the dictionary has at most 256 atoms.
     #[must_use]
     pub fn narrow_indices(&self) -> Option<Vec<u8>> {
         match self.model.codes().indices() {
@@ -90,7 +91,7 @@ impl Chunk {
         }
     }
 
-    /// The atoms of all nonzeros if the dictionary has more than 256 atoms.
+    /// Returns the atoms of all nonzeros if the dictionary has more than 256 atoms.
     #[must_use]
     pub fn wide_indices(&self) -> Option<Vec<u16>> {
         match self.model.codes().indices() {
@@ -99,7 +100,7 @@ impl Chunk {
         }
     }
 
-    /// The values of all nonzeros as the bits of half floats, if they are of half precision.
+    /// Returns the values of all nonzeros as the bits of half floats, if they have half precision.
     #[must_use]
     pub fn half_values(&self) -> Option<Vec<u16>> {
         match self.model.codes().values() {
@@ -108,7 +109,7 @@ impl Chunk {
         }
     }
 
-    /// The values of all nonzeros, if they are of single precision.
+    /// Returns the values of all nonzeros, if they have single precision.
     #[must_use]
     pub fn full_values(&self) -> Option<Vec<f32>> {
         match self.model.codes().values() {
@@ -117,19 +118,19 @@ impl Chunk {
         }
     }
 
-    /// The Gaussians that have a row instead of a code, counted from the first of the chunk.
+    /// Returns the Gaussians that have a row instead of a code, counted from the first Gaussian of the chunk.
     #[must_use]
     pub fn escapes(&self) -> Vec<u32> {
         self.model.codes().escapes().gaussians.clone()
     }
 
-    /// The rows of those Gaussians.
+    /// Returns the rows of these Gaussians.
     #[must_use]
     pub fn escape_rows(&self) -> Vec<f32> {
         self.model.codes().escapes().rows.clone()
     }
 
-    /// The atoms of the dictionary, row by row, channel-major.
+    /// Returns the atoms of the dictionary, row by row, channel-major.
     #[must_use]
     pub fn dictionary(&self) -> Vec<f32> {
         self.model.dictionary().as_slice().to_vec()

@@ -15,10 +15,10 @@ pub struct Decoder {
 
 #[wasm_bindgen]
 impl Decoder {
-    /// A decoder of the file that [starts](crate::Feed::start) with `start`. Errors call it `name`.
+    /// Returns a decoder of the file that [starts](crate::Feed::start) with `start`. Errors call the file `name`.
     ///
     /// # Errors
-    /// What is wrong with the bytes.
+    /// An error that tells what is wrong with the bytes.
     #[wasm_bindgen(constructor)]
     pub fn new(name: &str, start: &[u8], sh_parts: u32) -> Result<Self, JsError> {
         let options = FeedOptions::default().with_sh_parts(sh_parts as usize);
@@ -30,10 +30,10 @@ impl Decoder {
         Ok(Self { feed })
     }
 
-    /// Decodes the chunk of `job`. Memory is that of one chunk.
+    /// Decodes the chunk of `job`. It takes the memory of one chunk.
     ///
     /// # Errors
-    /// What is wrong with the bytes.
+    /// An error that tells what is wrong with the bytes.
     pub fn decode(&mut self, job: &[u8]) -> Result<Chunk, JsError> {
         let chunk = job::take(&mut self.feed, job).map_err(thrown)?;
         let model = self.feed.decode(chunk);

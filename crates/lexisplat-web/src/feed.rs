@@ -1,25 +1,25 @@
-//! The reader of a packed file on the main thread: it takes bytes, and says what is worth decoding.
+//! The reader of a packed file on the main thread. It takes bytes, and tells which chunk is worth decoding.
 
 use lexisplat::lexi::{FeedOptions, Layout, LexiFeed, PACKED_VERSION};
 use wasm_bindgen::prelude::*;
 
 use crate::{header, job, limits, thrown};
 
-/// What was decoded of a chunk.
+/// The state of a chunk.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 enum Done {
-    /// Nothing.
+    /// The chunk was not decoded.
     #[default]
     Nothing,
-    /// It was decoded when so many of its ranges were there and so many chunks around it missing.
+    /// The chunk was decoded when `ranges` of its ranges had come and `missing` of the chunks around it had not.
     Coarse { ranges: usize, missing: usize },
-    /// Its bytes were dropped to make room. It is asked for again when nothing around it is missing.
+    /// The bytes of the chunk were dropped to make room. They are requested again when no chunk around it is missing.
     Dropped,
-    /// All of it.
+    /// The chunk was decoded completely.
     Final,
 }
 
-/// Takes a packed file as its bytes come. Decodes nothing itself.
+/// Takes a packed file as its bytes arrive. It decodes nothing itself.
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Feed {
@@ -31,7 +31,8 @@ pub struct Feed {
 
 #[wasm_bindgen]
 impl Feed {
-    /// A feed that holds at most `most_bytes` of the file and asks for `sh_parts` parts of SH-rest. Errors call the file `name`.
+    /// Returns a feed that holds at most `most_bytes` bytes of the file and requests `sh_parts` parts of SH-rest. Errors
+    /// call the file `name`.
     #[wasm_bindgen(constructor)]
     #[must_use]
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
@@ -41,18 +42,18 @@ impl Feed {
         Self { feed: LexiFeed::new(name, &options, &limits()), done: Vec::new(), given_up: Vec::new() }
     }
 
-    /// The first and the last byte to fetch next, the last not included. Nothing if all came, or if there is no room until
-    /// chunks are decoded.
+    /// Returns the first byte to fetch next, and the byte after the last. Returns `None` if all bytes have come, or if
+    /// there is no room until chunks are decoded.
     #[must_use]
     #[expect(clippy::cast_precision_loss, reason = "files are far below 2^53 bytes")]
     pub fn wants(&self) -> Option<Vec<f64>> {
         self.feed.wants().map(|range| vec![range.start as f64, range.end as f64])
     }
 
-    /// Takes `bytes`, which are in the file from `at` on. Those that are not asked for are dropped.
+    /// Takes `bytes`, which are at `at` in the file. Bytes that were not requested are dropped.
     ///
     /// # Errors
-    /// What is wrong with them. They are asked for again.
+    /// An error that tells what is wrong with the bytes. They are requested again.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
     pub fn feed(&mut self, at: f64, bytes: &[u8]) -> Result<(), JsError> {
         let result = self.feed.feed(at as u64, bytes).map_err(thrown);
@@ -62,7 +63,7 @@ impl Feed {
         result
     }
 
-    /// What the file says of itself, as JSON, once its start came.
+    /// Returns the facts in the file's header as JSON, once the start of the file has come.
     #[must_use]
     pub fn header(&self) -> Option<String> {
         let (head, outline) = (self.feed.head()?, self.feed.outline()?);
@@ -81,34 +82,36 @@ impl Feed {
         Some(header::json(Layout::Packed, head.meta.antialiased, &fields))
     }
 
-    /// The bytes at the start of the file, which a [`Decoder`](crate::Decoder) takes, once they came.
+    /// Returns the bytes at the start of the file, for a [`Decoder`](crate::Decoder), once they have come.
     #[must_use]
     pub fn start(&self) -> Option<Vec<u8>> {
         self.feed.start().map(<[u8]>::to_vec)
     }
 
-    /// The atoms of the dictionary, row by row, channel-major; none before the start came.
+    /// Returns the atoms of the dictionary, row by row, channel-major. There are none until the start of the file has
+    /// come.
     #[must_use]
     pub fn dictionary(&self) -> Vec<f32> {
         self.feed.dictionary().map_or_else(Vec::new, |dictionary| dictionary.as_slice().to_vec())
     }
 
-    /// The layer of chunk `chunk`.
+    /// Returns the layer of chunk `chunk`.
     #[must_use]
     pub fn layer(&self, chunk: usize) -> usize {
         self.feed.outline().and_then(|outline| outline.chunks.get(chunk)).map_or(0, |chunk| chunk.layer)
     }
 
-    /// Whether every chunk was given as a job as fine as it can be.
+    /// Returns whether a job was returned for every chunk at its best quality.
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.feed.outline().is_some() && self.done.iter().all(|&done| done == Done::Final)
     }
 
-    /// The chunk that is most worth decoding now, if there is one.
+    /// Returns the chunk that is most worth decoding now, if there is one.
     ///
-    /// Without `refine` that is one of which all bytes came. With it that is one that was not decoded yet, else one that can be
-    /// decoded as fine as it will be, else, if `idle`, one that became finer since it was decoded.
+    /// Without `refine` only chunks count whose bytes have all come. With `refine` a chunk that was not decoded yet is
+    /// returned first, then a chunk that can be decoded at its best quality, then, if `idle` is set, a chunk that can be
+    /// decoded better than before.
     #[must_use]
     pub fn next(&self, refine: bool, idle: bool) -> Option<usize> {
         let chunks = 0..self.done.len();
@@ -123,14 +126,14 @@ impl Feed {
         first.or_else(last).or_else(|| if idle { better() } else { None })
     }
 
-    /// Whether all that can be had of chunk `chunk` is there.
+    /// Returns whether all data for chunk `chunk` have come.
     #[must_use]
     pub fn is_final(&self, chunk: usize) -> bool {
         self.feed.is_chunk_complete(chunk) && self.feed.is_ready(chunk) && self.missing(chunk) == 0
     }
 
-    /// What a [`Decoder`](crate::Decoder) needs to decode chunk `chunk`. Without `refine` it is decoded as if all other chunks
-    /// were there. The bytes of a chunk that is as fine as it can be are dropped.
+    /// Returns the job of chunk `chunk`: the data that a [`Decoder`](crate::Decoder) needs. Without `refine` the chunk is
+    /// decoded as if all other chunks had come. The bytes of a chunk at its best quality are dropped.
     pub fn job(&mut self, chunk: usize, refine: bool) -> Vec<u8> {
         let job = job::write(&self.feed, chunk, !refine);
         let is_final = self.is_final(chunk) || !refine;
@@ -144,9 +147,9 @@ impl Feed {
         job
     }
 
-    /// Makes room where [`Self::wants`] has none: drops the bytes of chunks that are whole but wait for others around them, or
-    /// if there are none, those of all chunks but the first that is not whole. They are asked for again later. Returns whether
-    /// there were any.
+    /// Makes room if [`Self::wants`] has none. Drops the bytes of chunks that are whole but wait for others around them.
+    /// If there are none, drops the bytes of all chunks but the first that is not whole. Dropped bytes are requested
+    /// again later. Returns whether any bytes were dropped.
     pub fn relieve(&mut self) -> bool {
         let open = |c: &usize| !matches!(self.done.get(*c), Some(Done::Final | Done::Dropped));
         let holding = (0..self.done.len()).filter(open).filter(|&c| self.feed.whole_ranges(c) > 0);
@@ -162,8 +165,8 @@ impl Feed {
         !dropped.is_empty()
     }
 
-    /// Asks again for the first of the chunks that [`Self::relieve`] dropped around which all came. Returns whether there was
-    /// one.
+    /// Requests again the first chunk that [`Self::relieve`] dropped and around which all chunks have come. Returns
+    /// whether there was such a chunk.
     pub fn ask_again(&mut self) -> bool {
         let is_next = |&c: &usize| self.done.get(c) == Some(&Done::Dropped) && self.missing(c) == 0;
         let Some(c) = (0..self.done.len()).find(is_next) else { return false };
@@ -174,8 +177,9 @@ impl Feed {
         true
     }
 
-    /// Asks for no chunk that ends beyond the first `gaussians` Gaussians of the file, unless it was decoded. Chunks of the layer
-    /// before stay as they are drawn without them. Returns the number of Gaussians that will be decoded.
+    /// Cancels the requests of all chunks that end beyond the first `gaussians` Gaussians of the file and were not
+    /// decoded. Chunks of the layer before stay as they are drawn without them. Returns the number of Gaussians that will
+    /// be decoded.
     pub fn give_up(&mut self, gaussians: usize) -> usize {
         let chunks = self.feed.outline().map(|outline| outline.chunks.clone()).unwrap_or_default();
         let mut kept = 0;
@@ -196,7 +200,7 @@ impl Feed {
         Done::Coarse { ranges: self.feed.whole_ranges(chunk), missing: self.missing(chunk) }
     }
 
-    /// How many chunks around `chunk` have not come but will.
+    /// Returns how many chunks around `chunk` have not come but will come.
     fn missing(&self, chunk: usize) -> usize {
         let comes = |c: &usize| !self.feed.came(*c) && !self.given_up.get(*c).copied().unwrap_or(false);
         self.feed.around(chunk).filter(comes).count()

@@ -1,18 +1,19 @@
-//! What a worker needs to decode a chunk, as bytes that can be handed from thread to thread.
+//! Jobs: the data that a worker needs to decode a chunk, as bytes that can be passed from thread to thread.
 //!
-//! All numbers are little-endian. A job has the number of the chunk (u32), the number of chunks whose base came (u32), those
-//! (u32 each), the number of ranges (u32), where each starts in the file (u64) and its length (u32), and their bytes.
+//! All numbers are little-endian. A job has the number of the chunk (u32), the number of chunks whose base has come
+//! (u32), the numbers of these chunks (u32 each), the number of ranges (u32), the place in the file (u64) and length
+//! (u32) of each range, and the bytes of the ranges.
 
 use lexisplat::lexi::LexiFeed;
 use lexisplat::{Error, Result};
 
-/// The job of decoding chunk `chunk` of `feed`. With `all` it is decoded as if all other chunks were there.
+/// Returns the job of decoding chunk `chunk` of `feed`. With `all` the chunk is decoded as if all other chunks had come.
 pub(crate) fn write(feed: &LexiFeed, chunk: usize, all: bool) -> Vec<u8> {
     let chunks = feed.outline().map_or(0, |outline| outline.chunks.len());
     let bases = if all { (0..chunks).collect() } else { feed.bases() };
     let ranges = feed.ranges(chunk);
     let mut job = Vec::new();
-    // Chunks and ranges are numbered by 32 bits in a file.
+    // A file numbers chunks and ranges by 32 bits.
     let mut number = |n: usize| job.extend(u32::try_from(n).unwrap_or(u32::MAX).to_le_bytes());
     number(chunk);
     number(bases.len());
@@ -26,10 +27,10 @@ pub(crate) fn write(feed: &LexiFeed, chunk: usize, all: bool) -> Vec<u8> {
     job
 }
 
-/// Gives `feed` what `job` holds. Returns the number of its chunk.
+/// Passes the contents of `job` to `feed`. Returns the number of its chunk.
 ///
 /// # Errors
-/// [`Error::Parameter`] for bytes that are no job, and what [`LexiFeed::feed`] says.
+/// [`Error::Parameter`] for bytes that are not a job, and errors of [`LexiFeed::feed`].
 pub(crate) fn take(feed: &mut LexiFeed, job: &[u8]) -> Result<usize> {
     let wrong = || Error::parameter("job", format!("{} bytes", job.len()), "what Feed.job gave");
     let Job { chunk, bases, ranges } = Job::read(job).ok_or_else(wrong)?;

@@ -1,22 +1,21 @@
-//! The decoder of lexisplat for browsers and Node, as WebAssembly, and with the feature `viewer` what the viewer page is
-//! made of.
+//! The decoder of lexisplat for browsers and Node, as WebAssembly, and with the feature `viewer` the parts of the viewer page.
 //!
-//! The npm package `lexisplat` (`web/` in the repository) is what people use. Its JavaScript fetches bytes and owns the
-//! workers. What is here does the rest:
+//! People use the npm package `lexisplat` (`web/` in the repository). Its JavaScript fetches the bytes and owns the workers. This
+//! crate does the rest:
 //!
-//! | feature | where | what |
+//! | feature | type, and where it runs | purpose |
 //! |---|---|---|
-//! | `feed` | [`Feed`], on the main thread | takes the bytes of a file as they come, and says which chunk is worth decoding next |
+//! | `feed` | [`Feed`], on the main thread | takes the bytes of a file as they arrive, and tells which chunk to decode next |
 //! | `feed` | [`Decoder`], in each worker | decodes chunks, which it gets as [jobs](Feed::job) |
 //! | `files` | [`Whole`], in a worker | decodes files that cannot be decoded in part |
 //!
 //! Pages load what they need: the npm package has one WebAssembly module of `feed` and one of `files`.
 //!
-//! With `viewer` there are also
+//! The feature `viewer` adds:
 //!
-//! | where | what |
+//! | function or type, and where it runs | purpose |
 //! |---|---|
-//! | `open_scene`, in a worker | reads a scene of any format and gives its parts as the GPU holds them |
+//! | `open_scene`, in a worker | reads a scene of any format and returns its parts in the form that the GPU holds |
 //! | `Viewer`, on the main thread | draws one or two scenes of such parts by WebGPU |
 //!
 //! No function panics, whatever bytes it is given. Errors become JavaScript's `Error` with the library's message.
@@ -51,16 +50,16 @@ pub use whole::Whole;
 use lexisplat::Limits;
 use wasm_bindgen::JsError;
 
-/// Most bytes of arrays made of one file: half of what 32-bit WebAssembly can address, so that a file is refused before memory
-/// runs out.
+/// Largest number of bytes of arrays made of one file. It is half of what 32-bit WebAssembly can address, so that a file
+/// is refused before memory runs out.
 const MOST_BYTES: u64 = 2 << 30;
 
-/// The limits of all readers here.
+/// Returns the limits of all readers of this crate.
 fn limits() -> Limits {
     Limits::default().with_bytes(MOST_BYTES)
 }
 
-/// The error that JavaScript sees.
+/// Returns the error for JavaScript.
 fn thrown(error: impl std::fmt::Display) -> JsError {
     JsError::new(&error.to_string())
 }

@@ -1,4 +1,4 @@
-//! Parts of scenes as the GPU holds them, made in workers.
+//! Parts of scenes in the form that the GPU holds. Workers make them.
 
 use js_sys::{Function, Uint8Array};
 use lexisplat::Silent;
@@ -12,32 +12,32 @@ use wasm_bindgen::prelude::*;
 use crate::chunk::Chunk;
 use crate::{limits, thrown};
 
-/// Gaussians of a part of a scene that is read whole: with dense SH of degree 3, 16 MB on the GPU.
+/// Number of Gaussians of a part of a scene that is read whole. With dense SH of degree 3 a part takes 16 MB on the GPU.
 const PART: usize = 65_536;
 
 #[wasm_bindgen]
 impl Chunk {
-    /// The chunk as the GPU holds it, for `Viewer.part`.
+    /// Returns the chunk in the form that the GPU holds, for `Viewer.part`.
     ///
     /// # Errors
-    /// If it is larger than WebAssembly addresses.
+    /// An error if it is larger than WebAssembly can address.
     pub fn part(&self) -> Result<Uint8Array, JsError> {
         bytes_of(&Scene::from(self.model()))
     }
 
-    /// What all chunks of the scene share on the GPU, for `Viewer.form`.
+    /// Returns the data that all chunks of the scene share on the GPU, for `Viewer.form`.
     #[must_use]
     pub fn form(&self) -> Vec<u8> {
         SceneForm::of(&Scene::from(self.model())).to_bytes()
     }
 }
 
-/// Reads the scene in `bytes`, of any format that lexisplat reads. Errors call it `name`. Calls `on_form` with the form of the
-/// scene and what the file says of itself as JSON, then `on_part` with the number, the bytes and the
-/// number of Gaussians of each part.
+/// Reads the scene in `bytes`, of any format that lexisplat reads. Errors call it `name`. Calls `on_form` with the form
+/// of the scene and facts about the file as JSON, then `on_part` with the number, the bytes and the number of Gaussians
+/// of each part.
 ///
 /// # Errors
-/// What is wrong with the bytes, and what the functions throw.
+/// An error that tells what is wrong with the bytes, and errors that the functions throw.
 #[wasm_bindgen]
 pub fn open_scene(name: &str, bytes: &[u8], on_form: &Function, on_part: &Function) -> Result<(), JsValue> {
     let options = ReadOptions::default().with_limits(limits());
@@ -65,7 +65,7 @@ pub fn open_scene(name: &str, bytes: &[u8], on_form: &Function, on_part: &Functi
             .map(drop)
     };
     if let Opened::Lexi(reader) = &opened {
-        // Codes stay codes.
+        // Sparse codes are kept.
         let mut failed = Ok(());
         let mut index = 0;
         let read = reader.each(&mut |_, model| {
@@ -75,7 +75,7 @@ pub fn open_scene(name: &str, bytes: &[u8], on_form: &Function, on_part: &Functi
             index += 1;
             match failed {
                 Ok(()) => Ok(()),
-                // The reader stops at an error; the one above is what is told.
+                // The reader stops at an error. The error stored above is returned instead of this one.
                 Err(_) => Err(lexisplat::Error::parameter("part", index, "a part that is taken")),
             }
         });

@@ -19,7 +19,7 @@ impl Whole {
     /// Decodes the .lexi file in `bytes`. Errors call it `name`.
     ///
     /// # Errors
-    /// What is wrong with the bytes.
+    /// An error that tells what is wrong with the bytes.
     #[wasm_bindgen(constructor)]
     pub fn new(name: &str, bytes: &[u8]) -> Result<Self, JsError> {
         let reader = lexi::LexiReader::open(name, bytes, &limits()).map_err(thrown)?;
@@ -37,13 +37,13 @@ impl Whole {
         Ok(Self { header, model: Some(model) })
     }
 
-    /// What the file says of itself, as JSON.
+    /// Returns the facts in the file's header as JSON.
     #[must_use]
     pub fn header(&self) -> String {
         self.header.clone()
     }
 
-    /// The chunk, once.
+    /// Returns the chunk, at the first call only.
     pub fn chunk(&mut self) -> Option<Chunk> {
         self.model.take().map(|model| Chunk::new(model, 0))
     }

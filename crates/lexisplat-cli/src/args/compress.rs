@@ -11,7 +11,7 @@ use lexisplat_render::Device;
 use super::part::Part;
 use super::values::{length, preset, real, size, viewpoints, whole};
 
-/// Heading of the options that say how good or how small the file shall be.
+/// Heading of the options that set the quality or the size of the file.
 const TARGET: &str = "Target, at most one of";
 /// Heading of the options that packed files do not have.
 const EXACT: &str = "Options of the layouts f16, f32 and paper";
@@ -19,124 +19,131 @@ const EXACT: &str = "Options of the layouts f16, f32 and paper";
 /// Compress a trained scene to a .lexi file. Needs no photos, no cameras and no retraining.
 #[derive(Debug, Args)]
 pub(crate) struct Compress {
-    /// The scene: a PLY, best the trainer's own, or SPZ, SOG, compressed.ply, .splat, .ksplat or glTF;
-    /// `-` reads standard input. Several are the tiles of one scene, of the same SH degree and with the same properties,
-    /// and become one file.
+    /// The scene file: a PLY (best the trainer's own), SPZ, SOG, compressed.ply, .splat, .ksplat or glTF; `-` reads
+    /// standard input. Several files are the tiles of one scene and become one .lexi. Tiles must have the same SH
+    /// degree and the same properties.
     #[arg(required = true, value_name = "INPUT")]
     pub(crate) inputs: Vec<PathBuf>,
-    /// The compressed file; `-` writes to standard output [default: the input's name with extension .lexi, if there is one
-    /// input].
+    /// The compressed file; `-` writes to standard output [default: the input's name with extension .lexi; with several
+    /// inputs there is no default].
     #[arg(short, long)]
     pub(crate) output: Option<PathBuf>,
-    /// Quality of the pictures, from the smallest files to the best pictures: about 35, 40, 45 and 54 dB of PSNR
-    /// [default: balanced].
+    /// Named quality, from the smallest file to the best pictures: small, balanced, high and archive aim at a PSNR of
+    /// 35, 40, 45 and 54 dB [default: balanced].
     #[arg(long, value_parser = preset(), group = "goal", value_name = "NAME", help_heading = TARGET)]
     pub(crate) preset: Option<Preset>,
-    /// Make the smallest file that has at least this PSNR on average over the views that it is judged by, in dB,
-    /// above 0.
+    /// Make the smallest file with a mean PSNR of at least DB decibels, above 0, such as 40. With cameras the mean is
+    /// over all views from which the file is judged, otherwise over the quarter of these views with the lowest PSNR.
     #[arg(long, group = "goal", value_name = "DB", value_parser = real::<f64>("40"), help_heading = TARGET)]
     pub(crate) psnr: Option<f64>,
-    /// Make the smallest file that has at least this PSNR in each of the views that it is judged by, in dB, above 0.
-    /// Other views may be worse.
+    /// Make the smallest file with a PSNR of at least DB decibels, above 0, such as 38, in each view from which the file
+    /// is judged. Other views of the scene may be worse.
     #[arg(long, group = "goal", value_name = "DB", value_parser = real::<f64>("40"), help_heading = TARGET)]
     pub(crate) min_psnr: Option<f64>,
-    /// Make the best file of at most this size, such as 10MB or 800kB.
+    /// Make the best file of at most BYTES bytes, such as 10MB or 800kB.
     #[arg(long, group = "goal", value_name = "BYTES", value_parser = size, help_heading = TARGET)]
     pub(crate) size: Option<u64>,
-    /// Make the best file that is at least this many times smaller than the source, above 1.
+    /// Make the best file that is at least R times smaller than the source, above 1, such as 20.
     #[arg(long, group = "goal", value_name = "R", value_parser = real::<f64>("20"), help_heading = TARGET)]
     pub(crate) ratio: Option<f64>,
-    /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default: cameras that
-    /// lie beside the scene or one folder above, or where INRIA's trainer leaves them; else views like photographs, which are
-    /// looked for].
+    /// Cameras from which the scene is drawn and the file is judged: a cameras.json, a transforms.json or a COLMAP
+    /// folder such as sparse/0 [default: cameras beside the scene, one folder above it or where INRIA's trainer leaves
+    /// them, if they seem to belong to the scene; otherwise views like photographs, which a search finds].
     #[arg(long, value_name = "PATH")]
     pub(crate) cameras: Option<PathBuf>,
-    /// Use no cameras that lie beside the scene.
+    /// Ignore cameras that lie beside the scene, one folder above it or where INRIA's trainer leaves them.
     #[arg(long, conflicts_with = "cameras")]
     pub(crate) no_cameras: bool,
-    /// Distance of the near plane of --cameras, in the scene's units, above 0. Gaussians nearer than it are not drawn
-    /// [default: the trainer's 0.2].
+    /// Distance of the near plane of --cameras, in the scene's units, above 0, such as 0.01. Gaussians nearer than this
+    /// distance are not drawn [default: the trainer's 0.2].
     #[arg(long, value_name = "UNITS", value_parser = length, requires = "cameras")]
     pub(crate) near: Option<f32>,
-    /// Draw and judge the scene from around an `object` or from inside a `room`. `auto` looks for views like
-    /// photographs [default: auto].
+    /// Viewpoints from which the scene is drawn and the file is judged: around an `object`, or inside a `room`. With
+    /// `auto` a search finds views like photographs [default: auto].
     #[arg(long, value_parser = viewpoints(), conflicts_with = "cameras")]
     pub(crate) views: Option<Viewpoints>,
-    /// Store the index that each Gaussian has in the source, 1 to 3 bytes each. Without it packed files lose the
-    /// order of the source.
+    /// Keep the order of the source: store each Gaussian's index in the source, 1 to 3 bytes each. Without this option
+    /// packed files have an order of their own.
     #[arg(long)]
     pub(crate) keep_order: bool,
-    /// Leave no Gaussian out. Otherwise those that show less than their bits are worth are left out, and base colours
-    /// and opacities make up for them and for errors. --keep-order and --tol leave none out either.
+    /// Keep all Gaussians. Without this option packing leaves out Gaussians whose effect on the pictures is not worth
+    /// their bits. It then fits base colours and opacities to the pictures again, which makes up for the missing
+    /// Gaussians and for rounding. --keep-order and --tol keep all Gaussians too.
     #[arg(long)]
     pub(crate) keep_all: bool,
-    /// Leave out Gaussians that show least until at most N stay, for viewers with a limit. --preset is then the quality of the
-    /// file beside the smaller scene. --psnr and --min-psnr compare it with the original scene [default: no limit].
+    /// Keep at most N Gaussians, for viewers with a limit. The Gaussians with the least effect on the pictures are left
+    /// out. --preset is then the quality relative to the reduced scene; --psnr and --min-psnr are relative to the
+    /// original scene [default: no limit].
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) max_gaussians: Option<usize>,
-    /// Largest error of any Gaussian's SH vector, above 0: the L2 norm of the difference, not squared. The encoder
-    /// verifies it for every Gaussian. Without --layout everything else is kept exactly (layout f16). With
-    /// --layout packed everything else is quantised [default: 0.1 with exact geometry, otherwise none].
+    /// Largest error of each Gaussian's SH vector, above 0, such as 0.05: the L2 norm of the difference, not squared.
+    /// The encoder verifies the bound for every Gaussian. Without --layout the layout is f16, which keeps all other
+    /// values exactly. With --layout packed all other values are quantised
+    /// [default: 0.1 with exact geometry, otherwise none].
     #[arg(long, value_name = "T", value_parser = real::<f64>("0.1"))]
     pub(crate) tol: Option<f64>,
-    /// Most nonzeros in the code of one Gaussian. With it --tol is no longer guaranteed: the report counts the
-    /// Gaussians whose error is larger [default: no cap].
+    /// Largest number of nonzeros in the code of one Gaussian. With this option --tol is not guaranteed. The report
+    /// counts the Gaussians whose error is larger than --tol [default: no cap].
     #[arg(long, value_name = "K", value_parser = whole::<u8>(0..=255), help_heading = EXACT)]
     pub(crate) max_nonzeros: Option<u8>,
-    /// Atoms of the dictionary, 1 to 1024 [default: as many as make the file smaller if packed, otherwise twice the
-    /// dimension: 90 at SH degree 3].
+    /// Number of atoms of the dictionary, 1 to 1024
+    /// [default: packed files have the number that makes the file smallest; others have twice the dimension of the SH
+    /// vector, which is 90 at SH degree 3].
     #[arg(long, value_name = "M", value_parser = whole::<usize>(0..=u64::MAX))]
     pub(crate) atoms: Option<usize>,
-    /// The pursuit that chooses atoms: `ols` needs fewer of them, `omp` is the paper's [default: ols].
+    /// Pursuit that chooses the atoms of each Gaussian: `ols` needs fewer atoms, `omp` is the pursuit of the paper
+    /// [default: ols].
     #[arg(long, value_name = "omp|ols", help_heading = EXACT)]
     pub(crate) pursuit: Option<Pursuit>,
-    /// Layout of the file. `packed` quantises and entropy-codes everything. `f16` and `f32` keep geometry exactly
-    /// and hold the values of codes in 16 or 32 bits. `paper` holds what the paper counts [default: packed, or
-    /// f16 if --tol or an option for exact geometry is given].
+    /// Layout of the file. `packed` quantises and entropy-codes everything. `f16`, `f32` and `paper` keep the geometry
+    /// exactly. `f16` and `f32` store the values of codes in 16 or 32 bits. `paper` stores codes as the paper counts
+    /// them: 32-bit pointers, indices and values [default: packed, or f16 if --tol or an option for exact geometry is
+    /// given].
     #[arg(long, value_name = "packed|f32|f16|paper")]
     pub(crate) layout: Option<Layout>,
-    /// Use the dictionary in this file, a dictionary or a .lexi, instead of learning one.
+    /// File of a dictionary to use instead of learning one: a dictionary file or a .lexi.
     #[arg(long, value_name = "FILE", conflicts_with = "atoms", help_heading = EXACT)]
     pub(crate) dictionary: Option<PathBuf>,
-    /// Also write the dictionary to this file, for use with other scenes.
+    /// File to write the dictionary to, for use with other scenes.
     #[arg(long, value_name = "FILE", help_heading = EXACT)]
     pub(crate) save_dictionary: Option<PathBuf>,
-    /// Most Gaussians that the dictionary is learned from [default: 65536].
+    /// Largest number of Gaussians from which the dictionary is learned [default: 65536].
     #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX), help_heading = EXACT)]
     pub(crate) sample: Option<usize>,
-    /// Seed of the choice of Gaussians that the dictionary is learned from.
+    /// Seed of the random choice of Gaussians from which the dictionary is learned.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX))]
     pub(crate) seed: u64,
-    /// Remove Gaussians with NaN or infinite values. Without this option such a file is refused. Sizes of zero (scales of
-    /// -inf) and infinite opacities are always read.
+    /// Leave out Gaussians with NaN or infinite values. Without this option a file with such values is refused. Sizes
+    /// of zero (scales of -inf) and infinite opacities are always read.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
-    /// Leave out properties that 3DGS does not define. Otherwise they are kept as they are, and a column of floats can
-    /// take half of a packed file.
+    /// Leave out properties that 3DGS does not define. Without this option they are kept without loss, and one column
+    /// of floats can take half of a packed file.
     #[arg(long)]
     pub(crate) drop_extras: bool,
-    /// Estimate how much each Gaussian shows from its own values instead of drawing the scene. This is several times
-    /// faster and makes larger files of the same quality. The only target is then --preset.
+    /// Estimate the effect of each Gaussian on the pictures from its own values, without drawing the scene. This is
+    /// several times faster and makes larger files of the same quality. --preset is then the only target.
     #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "views"])]
     pub(crate) guess: bool,
-    /// Approximate memory that packing a whole scene may take, such as 500MB. A scene that needs more is packed in
-    /// parts, each drawn on its own, and so is one of more than 786,432 Gaussians without cameras. The only targets are
-    /// then --preset and --psnr. Packing in parts takes up to 1.5 GiB, however small BYTES is. Files of the other
-    /// layouts do not depend on it.
+    /// Approximate memory for packing a whole scene, such as 500MB. A scene that needs more is packed in parts, and
+    /// each part is drawn on its own. So is a scene of more than 786,432 Gaussians without cameras. A scene in parts
+    /// has only the targets --preset and --psnr. Packing in parts takes up to 1.5 GiB, however small BYTES is. Files of
+    /// the other layouts do not depend on this option.
     #[arg(long, default_value = "4GiB", value_name = "BYTES", value_parser = size)]
     pub(crate) memory: u64,
-    /// The device that draws the scene: `cpu`, `gpu`, `auto` (a GPU if there is one) or a number from `lexisplat
-    /// devices`. With `cpu` the same input gives the same file on every machine. A GPU is faster, and its name is
-    /// recorded in the file.
+    /// Device that draws the scene: `cpu`, `gpu`, `auto` (a GPU if there is one that is not emulated in software,
+    /// otherwise the CPU) or a number from `lexisplat devices`. With `cpu` the same input gives the same file on every
+    /// machine. A GPU is faster. The file then records the name of the GPU.
     #[arg(long, default_value = "cpu", value_name = "auto|cpu|gpu|N")]
     pub(crate) device: Device,
-    /// Print the details too: what bytes, bits, codes and seconds went to.
+    /// Print the details too: bytes and bits of each part of the file, statistics of the codes, and seconds of each
+    /// step.
     #[arg(long)]
     pub(crate) all: bool,
 }
 
 impl Compress {
-    /// The options that only layouts with exact geometry have, and whether they are given.
+    /// Returns the options that only layouts with exact geometry have, and for each whether it is given.
     fn exact_only(&self) -> [(&'static str, bool); 5] {
         [
             ("--max-nonzeros", self.max_nonzeros.is_some()),
@@ -147,7 +154,7 @@ impl Compress {
         ]
     }
 
-    /// The options that only packed files have, and whether they are given.
+    /// Returns the options that only packed files have, and for each whether it is given.
     fn packed_only(&self) -> [(&'static str, bool); 11] {
         [
             ("--guess", self.guess),
@@ -164,13 +171,14 @@ impl Compress {
         ]
     }
 
-    /// Whether cameras that lie beside the scene are used.
+    /// Returns whether a search for cameras beside the scene is allowed: one input, and none of --cameras, --no-cameras
+    /// and --views.
     pub(crate) fn looks_beside(&self) -> bool {
         let other = self.cameras.is_some() || self.no_cameras || self.views.is_some();
         !other && self.inputs.len() == 1
     }
 
-    /// Returns the layout that is given, or the one that the other options need.
+    /// Returns the layout that is given, or the layout that the other options need.
     ///
     /// # Errors
     /// A layout and an option that do not go together.
@@ -186,7 +194,7 @@ impl Compress {
 pub(crate) struct Decompress {
     /// The compressed scene, a .lexi file; `-` reads standard input.
     pub(crate) input: PathBuf,
-    /// The PLY; `-` writes to standard output [default: the input's name with extension .ply].
+    /// The PLY file; `-` writes to standard output [default: the input's name with extension .ply].
     #[arg(short, long)]
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]

@@ -9,7 +9,7 @@ use super::part::Part;
 use super::values::{sh_path, whole};
 use super::views::Views;
 
-/// Draw a scene to PNG files. A .lexi is drawn straight from its sparse codes.
+/// Draw a scene to PNG files. A .lexi is drawn from its sparse codes, without dense SH.
 #[derive(Debug, Args)]
 pub(crate) struct Render {
     /// The scene, of any format (docs/FORMATS.md); `-` reads standard input.
@@ -23,20 +23,20 @@ pub(crate) struct Render {
     pub(crate) views: Views,
 }
 
-/// Draw two scenes from the same cameras and score the second against the first. Without --cameras and --views views
-/// like photographs are looked for, as sharp as the scene, as `compress` does.
+/// Draw two scenes from the same cameras and score the second against the first. Without --cameras, --views object and
+/// --views room a search finds views like photographs, as sharp as the scene, as in `compress`.
 #[derive(Debug, Args)]
 pub(crate) struct Compare {
-    /// The original, of any format.
+    /// The original scene, of any format.
     pub(crate) a: PathBuf,
-    /// The scene to score, of any format.
+    /// The scene to score against the original, of any format.
     pub(crate) b: PathBuf,
     #[command(flatten)]
     pub(crate) views: Views,
-    /// Round pictures to 8 bits before they are scored, as saving them does.
+    /// Round pictures to 8 bits before scoring, as in saved pictures.
     #[arg(long = "8bit")]
     pub(crate) eight_bit: bool,
-    /// Save a picture of each view to this folder: both scenes and their amplified difference, side by side.
+    /// Folder for a picture of each view: both scenes and their amplified difference, side by side.
     #[arg(long, value_name = "DIR")]
     pub(crate) save_views: Option<PathBuf>,
 }
@@ -56,30 +56,31 @@ pub(crate) struct View {
     pub(crate) files: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) views: Views,
-    /// Actions for tests and recordings, such as `camera=3,mode=wipe,screenshot=a.png,quit`. `--help` lists them.
+    /// Actions for tests and recordings, such as `camera=3,mode=wipe,screenshot=a.png,quit`. `--help` lists the words.
     #[arg(long, value_name = "WORDS", default_value = "", hide_default_value = true)]
     pub(crate) actions: String,
 }
 
-/// Measure the time to draw each stage, with SH held in each way that the scene has.
+/// Measure how long each stage of drawing takes, for each way of holding SH in memory.
 ///
-/// Each view is drawn repeatedly after a warm-up. Only drawing is timed. On a GPU its own time stamps are used.
+/// Each view is drawn --warmup times and then --repeat times on the GPU, --cpu-repeat times on the CPU. Only drawing is
+/// timed. A GPU is timed by its own time stamps.
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// The scene, of any format. A .lexi is also drawn as a dense scene.
+    /// The scene, of any format. A .lexi is also drawn with dense SH.
     pub(crate) file: PathBuf,
     #[command(flatten)]
     pub(crate) views: Views,
-    /// Frames timed from each view on the GPU; at least 1.
+    /// Number of timed frames of each view on the GPU; at least 1.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = whole::<u32>(1..=u64::from(u32::MAX)))]
     pub(crate) repeat: u32,
-    /// Frames drawn from each view before the timed ones.
+    /// Number of frames drawn of each view before the timed frames.
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = whole::<u32>(0..=u64::from(u32::MAX)))]
     pub(crate) warmup: u32,
-    /// Frames timed from each view on the CPU; 0 leaves the CPU out.
+    /// Number of timed frames of each view on the CPU; 0 leaves the CPU out.
     #[arg(long, default_value_t = 3, value_name = "N", value_parser = whole::<u32>(0..=u64::from(u32::MAX)))]
     pub(crate) cpu_repeat: u32,
-    /// Ways to hold SH in GPU memory, with commas between them [default: all that the scene has].
+    /// Ways of holding SH in GPU memory to measure, with commas between them [default: all that the scene allows].
     #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = sh_path())]
     pub(crate) paths: Vec<ShPath>,
 }

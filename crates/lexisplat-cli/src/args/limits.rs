@@ -4,10 +4,10 @@ use lexisplat::Limits;
 
 use super::values::size;
 
-/// A limit that was given: its name and its value.
+/// A limit from the command line: its name and its value.
 pub(super) type Limit = (String, u64);
 
-/// Returns the default limits with those of `given` in their place.
+/// Returns the default limits with the values of `given` in their place.
 ///
 /// # Errors
 /// An unknown name, which [`limit`] refuses too.

@@ -42,30 +42,31 @@ pub(crate) struct Cli {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Options of every command")]
 pub(crate) struct Common {
-    /// Print one JSON object on standard output instead of text. On failure its member `error` has the `code`, which
-    /// is the exit code, the `kind`, a `message`, and `help` if there is advice.
+    /// Print one JSON object on standard output instead of text. On failure its member `error` has the exit code as
+    /// `code`, the `kind`, a `message`, and `help` if there is advice.
     #[arg(long, global = true)]
     pub(crate) json: bool,
     /// Print no progress and no summary. Warnings and errors are still printed.
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
-    /// Number of worker threads, at most 4 for each core; 0 is one for each core. Results do not depend on it.
+    /// Number of worker threads, at most 4 for each core; 0 means one for each core. Results do not depend on this
+    /// number.
     #[arg(long, global = true, default_value_t = 0, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX))]
     pub(crate) threads: usize,
-    /// Replace outputs that exist. Without this option they are refused with exit code 7.
+    /// Replace outputs that exist. Without this option an existing output is refused with exit code 7.
     #[arg(long, global = true)]
     pub(crate) overwrite: bool,
-    /// Refuse with exit code 6 a file that asks for more than N. N is a number, or a size such as 2GiB. The option may
-    /// be given once for each NAME. The names and their defaults: `gaussians` (4294967294), `atoms` of a dictionary
-    /// (1024), `nonzeros` of one Gaussian (72), `bytes` that a file takes in memory or that a pipe carries (no limit),
-    /// `expansion`, the bytes in memory for each byte of a file (256), `header_bytes` (4MiB), and `properties` of one
-    /// element of a PLY (4096).
+    /// Refuse with exit code 6 a file that asks for more than N. N is a number, or a size such as 2GiB. Example:
+    /// --limit bytes=2GiB. The option may be given once for each NAME. The names and their defaults: `gaussians`
+    /// (4294967294), `atoms` of a dictionary (1024), `nonzeros` of one Gaussian (72), `bytes` that a file takes in
+    /// memory or that a pipe carries (no limit), `expansion`, the bytes in memory for each byte of a file (256),
+    /// `header_bytes` (4MiB), and `properties` of one element of a PLY (4096).
     #[arg(long = "limit", global = true, value_name = "NAME=N", value_parser = limits::limit)]
     limits: Vec<limits::Limit>,
 }
 
 impl Common {
-    /// Returns the most that files may ask for.
+    /// Returns the limits on what files may ask for.
     ///
     /// # Errors
     /// An unknown name, which the parser of the command line has refused already.
@@ -94,7 +95,7 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    /// Whether the user acts while the command runs, in a window.
+    /// Returns whether the command opens a window in which the user acts while it runs.
     pub(crate) fn is_interactive(&self) -> bool {
         match self {
             #[cfg(feature = "view")]
@@ -104,45 +105,46 @@ impl Command {
     }
 }
 
-/// Print what a scene's file holds, and warn about what looks wrong with it.
+/// Print what the file of a scene holds, and warn about values that look wrong.
 #[derive(Debug, Args)]
 pub(crate) struct Info {
-    /// The file; `-` reads standard input.
+    /// The scene file, of any format; `-` reads standard input.
     pub(crate) file: PathBuf,
-    /// Print everything: ranges of all attributes, histograms, and of a .lexi its parts, layers and atoms.
+    /// Print all details: ranges of all attributes and histograms, and for a .lexi its parts, layers and atoms.
     #[arg(long)]
     pub(crate) all: bool,
-    /// Leave out Gaussians with NaN or infinite values. Without this option such a file is refused. Sizes of zero (scales of
-    /// -inf) and infinite opacities are always read.
+    /// Leave out Gaussians with NaN or infinite values. Without this option a file with such values is refused. Sizes
+    /// of zero (scales of -inf) and infinite opacities are always read.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
-    /// Verify the checksums of all numbers that a packed file decodes to, too. Those of its bytes are always verified.
+    /// Also verify the checksums of all decoded numbers of a packed file. The checksums of its bytes are always
+    /// verified.
     #[arg(long)]
     pub(crate) verify: bool,
 }
 
-/// List the GPUs that can draw, the best first.
+/// List the GPUs that can draw, the best first, with the numbers that --device takes.
 #[derive(Debug, Args)]
 pub(crate) struct Devices {}
 
-/// Make a sample scene, compress it, draw and compare it, and write a report as a web page.
+/// Make a sample scene, compress, draw and compare it, and write a report as a web page.
 #[derive(Debug, Args)]
 pub(crate) struct Demo {
-    /// Folder for everything that the demo makes.
+    /// Folder for all output of the demo.
     #[arg(short, long, default_value = "lexisplat-demo", value_name = "DIR")]
     pub(crate) output: PathBuf,
     /// Number of Gaussians in the scene.
     #[arg(long, default_value_t = 60_000, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX))]
     pub(crate) gaussians: usize,
-    /// Seed of the scene, and of the choice of Gaussians that the dictionary is learned from.
+    /// Seed of the scene, and of the random choice of Gaussians from which the dictionary is learned.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX))]
     pub(crate) seed: u64,
 }
 
-/// Print the completions of this program for a shell.
+/// Print the shell completions of this program.
 #[derive(Debug, Args)]
 pub(crate) struct Completions {
-    /// The shell.
+    /// The shell to print completions for.
     #[arg(value_enum)]
     pub(crate) shell: clap_complete::Shell,
 }
@@ -154,7 +156,8 @@ pub(crate) fn parse() -> Result<Cli, clap::Error> {
     Cli::from_arg_matches(&command().try_get_matches().map_err(with_advice)?)
 }
 
-/// Tells how the command of the command line `words` names its output, where it has one file or `-o` too many.
+/// Adds advice on naming the output to `error`, if the command line `words` has one file too many, or `-o` where the
+/// output is the last file.
 fn with_advice_on_outputs(mut error: clap::Error, mut words: impl Iterator<Item = String>) -> clap::Error {
     let all = command();
     let Some(ContextValue::String(extra)) = error.get(ContextKind::InvalidArg) else { return error };
@@ -182,7 +185,7 @@ pub(crate) fn command() -> clap::Command {
     Cli::command().mut_args(take_negative).mut_subcommands(|command| command.mut_args(take_negative))
 }
 
-/// Returns whether the command line of this process has `--json`, also if it cannot be parsed.
+/// Returns whether the command line of this process has `--json`, also if the command line cannot be parsed.
 pub(crate) fn asks_for_json() -> bool {
     std::env::args_os().take_while(|argument| argument != "--").any(|argument| argument == "--json")
 }

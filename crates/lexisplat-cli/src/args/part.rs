@@ -4,40 +4,41 @@ use clap::Args;
 
 use super::values::{size, whole};
 
-/// What a first part looks like, for messages.
+/// Form of the value of --first, for messages.
 const FIRST: &str = "expected a share such as 20%, or a size such as 500kB";
 
-/// What of a packed file is read.
+/// The part of a packed file to read.
 #[derive(Debug, Args)]
 pub(crate) struct Part {
-    /// Read only the first bytes of a packed file, a share such as 20% or a size such as 500kB, as far as they go. They
-    /// hold the whole scene, coarser or with fewer Gaussians. Extra properties and a kept order are left out.
+    /// Read only the first bytes of a packed file: a share such as 20%, or a size such as 500kB. Data beyond these
+    /// bytes are left out. The first bytes hold the whole scene, coarser or with fewer Gaussians. Extra properties and
+    /// a kept order are left out.
     #[arg(long, value_name = "PART", value_parser = first)]
     pub(crate) first: Option<First>,
-    /// Read at most N of the parts of SH beyond the base colour that a packed file holds, those that show most first. With
-    /// 0 there is no view-dependent colour, and `info` lists the parts.
+    /// Read at most N of a packed file's parts of SH beyond the base colour, in descending order of their effect on the
+    /// pictures. 0 leaves view-dependent colour out. `info` lists the parts.
     #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX))]
     pub(crate) sh_parts: Option<usize>,
 }
 
 impl Part {
-    /// Returns whether a part was asked for.
+    /// Returns whether one of these options is given.
     pub(crate) fn is_given(&self) -> bool {
         self.first.is_some() || self.sh_parts.is_some()
     }
 }
 
-/// The first bytes of a file.
+/// The first bytes of a file, as the value of --first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum First {
-    /// A share of all, above 0 and at most 1.
+    /// A share of the file, above 0 and at most 1.
     Share(f64),
-    /// So many.
+    /// A number of bytes.
     Bytes(u64),
 }
 
 impl First {
-    /// Returns the first of `bytes`.
+    /// Returns the first bytes of `bytes`, at most all of them.
     pub(crate) fn of(self, bytes: &[u8]) -> &[u8] {
         let all = bytes.len();
         let count = match self {
@@ -49,7 +50,7 @@ impl First {
     }
 }
 
-/// Parses a first part: a share in per cent, or a [`size`].
+/// Parses the value of --first: a share in per cent, or a [`size`].
 fn first(text: &str) -> Result<First, String> {
     let Some(share) = text.strip_suffix('%') else {
         return size(text).map(First::Bytes).map_err(|_| FIRST.to_owned());

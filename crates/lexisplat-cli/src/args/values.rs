@@ -8,22 +8,22 @@ use lexisplat::packed::Preset;
 use lexisplat_compress::{SplitFilter, Viewpoints};
 use lexisplat_render::gpu::ShPath;
 
-/// What a size looks like, for messages.
+/// Form of a size, for messages.
 const SIZE: &str = "expected a size such as 800kB, 10MB or 1.5MiB";
-/// Sizes below this, in bytes, can be told apart from overflow in `f64`.
+/// Bound of sizes, in bytes. Below it `f64` does not overflow.
 const MAX_SIZE: f64 = 1e18;
 
-/// Returns the parser of a preset's name, which also lists the names in the help.
+/// Returns the parser of a preset's name. The help lists the names.
 pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
     PossibleValuesParser::new(Preset::ALL.map(Preset::name)).try_map(|name| name.parse::<Preset>())
 }
 
-/// Returns the parser of the name of a way to hold SH, which also lists the names in the help.
+/// Returns the parser of the name of a way of holding SH. The help lists the names.
 pub(super) fn sh_path() -> impl TypedValueParser<Value = ShPath> {
     PossibleValuesParser::new(ShPath::ALL.map(ShPath::name)).try_map(|name| name.parse::<ShPath>())
 }
 
-/// Returns the parser of the place of generated views.
+/// Returns the parser of the viewpoints of generated views.
 pub(super) fn viewpoints() -> impl TypedValueParser<Value = Viewpoints> {
     PossibleValuesParser::new(["auto", "object", "room"]).try_map(|name| name.parse::<Viewpoints>())
 }
@@ -50,7 +50,7 @@ pub(super) fn whole<T: TryFrom<u64>>(
     }
 }
 
-/// Returns the parser of a number. Its message shows one that fits, `example`.
+/// Returns the parser of a number. Its message shows the number `example`.
 pub(super) fn real<T: FromStr>(
     example: &'static str,
 ) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
@@ -77,7 +77,7 @@ pub(super) fn size(text: &str) -> Result<u64, String> {
     }
 }
 
-/// Parses a length above 0.
+/// Parses a length: a finite number above 0.
 pub(super) fn length(text: &str) -> Result<f32, String> {
     let length = text.trim().parse().ok().filter(|v: &f32| v.is_finite() && *v > 0.0);
     length.ok_or_else(|| "expected a length in the scene's units, above 0, such as 0.01".to_owned())

@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
         for &path in &paths {
             match bench_gpu(gpu, &scene, path, &cameras, &options, &bars) {
                 Ok(times) => results.push(times),
-                // A path that has no room for this dictionary does not stop the others from being measured.
+                // If a path has no room for this dictionary, the other paths are still measured.
                 Err(lexisplat_compress::Error::Render(error @ lexisplat_render::Error::Parameter { .. }))
                     if args.paths.is_empty() =>
                 {
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     print(&report.text()?)
 }
 
-/// Returns the paths asked for, or all that the scene has.
+/// Returns the paths asked for, or else all paths that the scene allows.
 fn paths(asked: &[ShPath], scene: &Scene<'_>) -> Vec<ShPath> {
     if !asked.is_empty() {
         return asked.to_vec();
@@ -80,7 +80,7 @@ struct Report<'a> {
     name: &'a str,
     scene: Scene<'a>,
     cameras: &'a [Camera],
-    /// The GPU, and how fast it is.
+    /// The GPU and its measured rates.
     gpu: Option<(&'a Gpu, Speed)>,
     results: &'a [PathTimes],
 }
@@ -94,7 +94,7 @@ impl Report<'_> {
         self.model().map(|model| model.codes().nonzeros() as f64 / model.len().max(1) as f64)
     }
 
-    /// The shares of [`LANES`] that work: as the codes are stored, and if they were ordered.
+    /// Returns the shares of [`LANES`] that work, with codes in their stored order and with codes ordered by length.
     fn busy(&self) -> Option<[f64; 2]> {
         self.model().map(|model| busy_lanes(model, LANES, ORDER_BLOCK))
     }
@@ -147,8 +147,8 @@ impl Report<'_> {
         })
     }
 
-    /// Returns three speedups over dense f32 for each sparse path: of the radiance stage, of the frame, and of a frame
-    /// whose radiance takes no time.
+    /// Returns three speedups relative to dense f32 for each sparse path: of the radiance stage, of the frame, and of a
+    /// frame whose radiance takes no time.
     fn speedups(&self) -> Vec<(String, [f64; 3])> {
         let Some(dense) = self.find(ShPath::DenseF32) else { return Vec::new() };
         let (frame, radiance) = (dense.frame.median, dense.stage("radiance"));

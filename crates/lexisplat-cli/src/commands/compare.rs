@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
             check_free(&path, &[], common.overwrite)?;
             saved.push(path);
         }
-        // The scores follow the pictures.
+        // The scores are printed after all pictures are written.
         stop::while_writing(Work::Files(usize::MAX));
         make_folder(folder)?;
     }
@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     tell(common, json, || table(&a, &b, &comparison, args, renderer.name()))
 }
 
-/// Views of `a` that are like photographs, of the kind that judges what `compress` makes.
+/// Returns views of `a` that are like photographs. Views of this kind judge the files of `compress`.
 fn photographs(
     a: &SceneFile,
     views: &Views,

@@ -29,8 +29,8 @@ use crate::files::{
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
-/// A preset that falls short of its aim by more than this, in dB, is warned of. The `archive` of flowers, which stays
-/// below its aim by most in docs/results/promise.md, falls short by 2.2.
+/// Largest amount by which a preset may fall short of its aim without a warning, in dB. In docs/results/promise.md the
+/// `archive` of flowers falls short by most: 2.2 dB.
 const FAR_BELOW: f64 = 3.0;
 
 pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         .with_limits(limits);
     let bars = Bars::new(common.quiet);
     let all_bytes = files.iter().map(|(_, bytes)| bytes.len() as u64).sum();
-    // Only a scene that is packed whole is drawn from cameras.
+    // Cameras are only used for a scene that is packed whole.
     let may_look = args.looks_beside() && compression.holds_whole(all_bytes, true);
     let beside = if may_look && !is_pipe(first) { read_beside(first) } else { None };
     let whole = compression.holds_whole(all_bytes, beside.is_some());
@@ -131,7 +131,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         warn(&name, report.reached.as_ref().and_then(|reached| short(reached, preset)).as_slice());
     }
     if is_pipe(&output) {
-        // Standard output carries the file.
+        // Standard output carries the file, so the text goes to standard error.
         if !common.quiet {
             text(&report, &output, args.all)?.lines().for_each(note);
         }
@@ -142,7 +142,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     tell(common, json, || text(&report, &output, args.all))
 }
 
-/// The error for several inputs without an output, which the last of them may have been meant for.
+/// Returns the error for several inputs without an output. The last input may have been meant as the output.
 fn several(first: &Path, others: &[PathBuf]) -> Misuse {
     let count = others.len() + 1;
     let last = others.last().filter(|_| others.len() == 1);
@@ -159,7 +159,8 @@ fn several(first: &Path, others: &[PathBuf]) -> Misuse {
     Misuse { problem: format!("{count} inputs and no output: several inputs become one file"), help }
 }
 
-/// The scene of `opened`, which messages call `name`, unless it is compressed already or has no Gaussians.
+/// Returns the scene of `opened`, which messages call `name`. Returns an error if it is compressed already or has no
+/// Gaussians.
 pub(crate) fn source_to_compress<'a>(name: &str, opened: &'a Opened<'_>) -> Result<&'a dyn SplatSource> {
     match opened {
         Opened::Lexi(_) => {
@@ -170,7 +171,7 @@ pub(crate) fn source_to_compress<'a>(name: &str, opened: &'a Opened<'_>) -> Resu
     }
 }
 
-/// The choices of the library that the options mean.
+/// Returns the library's choices for these options.
 fn compression(args: &Compress, given: Option<&ViewSet>, limits: &Limits) -> Result<Compression> {
     let layout = args.chosen_layout()?;
     if layout != Layout::Packed {
@@ -213,7 +214,7 @@ fn exact(args: &Compress, layout: Layout, limits: &Limits) -> Result<CompressOpt
     Ok(options)
 }
 
-/// Three lines for people, and the details if `all` are asked for.
+/// Returns three lines for people, and the details if `all` is set.
 fn text(report: &CompressionReport, output: &Path, all: bool) -> Result<String> {
     let CompressionReport { gaussians, removed, .. } = report;
     let mut out = String::new();
@@ -246,7 +247,7 @@ fn text(report: &CompressionReport, output: &Path, all: bool) -> Result<String> 
     Ok(out)
 }
 
-/// What bytes, bits, codes and seconds went to.
+/// Returns the bytes, bits, codes and seconds of each part of the work, as text.
 fn details(report: &CompressionReport) -> Result<String> {
     let CompressionReport { gaussians, atoms, record, learn_seconds, code_seconds, .. } = report;
     let dim = report.nonzero_histogram.len().saturating_sub(1);
@@ -322,7 +323,7 @@ fn details(report: &CompressionReport) -> Result<String> {
     Ok(out)
 }
 
-/// The largest errors, and what was promised.
+/// Returns a line with the largest errors and the bound that was promised.
 pub(crate) fn error_line(record: &Record) -> String {
     let found = format!("maximum {:.6}, RMS {:.6}", record.max_residual, record.rms_residual);
     match (record.tolerance, record.max_nonzeros) {
@@ -335,7 +336,7 @@ pub(crate) fn error_line(record: &Record) -> String {
     }
 }
 
-/// A warning if what photographs show is not certain.
+/// Returns a warning if photographs may be much worse than the judged quality.
 fn uncertain(reached: &ReachedRecord) -> Option<String> {
     uncertain_by(reached).map(|below| {
         format!(
@@ -345,7 +346,7 @@ fn uncertain(reached: &ReachedRecord) -> Option<String> {
     })
 }
 
-/// A warning if a file has far less than its preset aims at.
+/// Returns a warning if a file has far less PSNR than its preset aims at.
 fn short(reached: &ReachedRecord, preset: Preset) -> Option<String> {
     let (found, aim) = (reached.judged_psnr, preset.decibels());
     (aim - found > FAR_BELOW).then(|| {
@@ -356,7 +357,7 @@ fn short(reached: &ReachedRecord, preset: Preset) -> Option<String> {
     })
 }
 
-/// A warning if one hard view made a file large.
+/// Returns a warning if one hard view made a file large.
 fn costly(target: &TargetRecord) -> Option<String> {
     overshoot(target).map(|above| {
         format!(
@@ -366,7 +367,7 @@ fn costly(target: &TargetRecord) -> Option<String> {
     })
 }
 
-/// What a file shows of its scene.
+/// Returns a line with the PSNR that a file reaches.
 fn reached_line(reached: &ReachedRecord) -> String {
     let ReachedRecord { judged_psnr, mean_psnr, min_psnr, views, cameras, .. } = reached;
     match cameras {
@@ -377,12 +378,13 @@ fn reached_line(reached: &ReachedRecord) -> String {
     }
 }
 
-/// How many Gaussians of the source a file lacks.
+/// Returns a line with the number of Gaussians of the source that a file lacks.
 pub(crate) fn removed_line(removed: u64) -> String {
     format!("{} Gaussians, which show least", format::count(removed))
 }
 
-/// The decibels that a file records, if it records any. A file may have `reached`, `target`, both or neither.
+/// Returns a line with the PSNR that a file records, if it records any. A file may have `reached`, `target`, both or
+/// neither.
 pub(crate) fn record_line(reached: Option<&ReachedRecord>, target: Option<&TargetRecord>) -> Option<String> {
     let of_target = |target: &TargetRecord| {
         let TargetRecord { mean_psnr, min_psnr, views, cameras, .. } = target;
@@ -391,7 +393,7 @@ pub(crate) fn record_line(reached: Option<&ReachedRecord>, target: Option<&Targe
     reached.map(reached_line).or_else(|| target.map(of_target))
 }
 
-/// The mean and the least PSNR over `views` views, which were `given` or else generated.
+/// Returns a line with the mean and the smallest PSNR over `views` views, which were `given` or else generated.
 fn psnr_line(mean: f64, least: f64, views: impl Display, given: bool) -> String {
     let kind = if given { "given cameras" } else { "generated views" };
     format!("{mean:.2} dB on average, {least:.2} dB at worst, over {views} {kind}")

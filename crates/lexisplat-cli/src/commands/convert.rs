@@ -20,9 +20,9 @@ use crate::files::{check_output, input, is_pipe, siblings, tell, warn, write_out
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
-/// What rounds when scenes become one.
+/// Text for the values that are rounded when scenes are merged.
 const UNITED: &str = "32-bit floats, relative to one offset for all scenes,";
-/// Views that --psnr draws.
+/// Number of views that --psnr draws.
 const VIEWS: usize = 8;
 
 pub(crate) fn run(args: &Convert, common: &Common) -> Result<()> {
@@ -77,7 +77,7 @@ pub(crate) fn run(args: &Convert, common: &Common) -> Result<()> {
     })
 }
 
-/// The format to write: the one that is asked for, or that of the output's extension.
+/// Returns the format to write: the format asked for, or the format of the output's extension.
 fn kind_of(output: &Path, asked: Option<Kind>) -> Result<Kind> {
     if let Some(kind) = asked {
         return Ok(kind);
@@ -105,7 +105,8 @@ fn kind_of(output: &Path, asked: Option<Kind>) -> Result<Kind> {
     }
 }
 
-/// All scenes as one, the names of extra properties that not all of them have, and the bytes read.
+/// Returns all scenes merged into one, the names of extra properties that not all of them have, and the number of bytes
+/// read.
 fn read_all(
     inputs: &[PathBuf],
     args: &Convert,
@@ -144,7 +145,7 @@ fn read_all(
     Ok((all, lost, bytes_in))
 }
 
-/// The mean and least PSNR of the file that was written against `splats`.
+/// Returns the mean and the smallest PSNR of the written file against `splats`.
 fn psnr(output: &Path, splats: &Splats, common: &Common, bars: &Bars) -> Result<Value> {
     let options = ReadOptions::default().with_limits(common.limits()?);
     let bytes = Input::open_within(output, &options.limits)?;
@@ -160,7 +161,7 @@ fn psnr(output: &Path, splats: &Splats, common: &Common, bars: &Bars) -> Result<
     Ok(serde_json::to_value(found.psnr)?)
 }
 
-/// What a file lacks, one phrase each.
+/// Returns what a file lacks, one phrase each.
 fn lost_lines(lost: &Lost) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some([from, to]) = lost.sh_degree {

@@ -24,12 +24,12 @@ use crate::page::{Page, Poster};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
-/// Views drawn and compared.
+/// Number of views drawn and compared.
 const VIEWS: usize = 6;
-/// What the demo makes beside the pictures: the scene, the packed file, the exact file, the report, the packed file with a
-/// viewer.
+/// Files of the demo beside the pictures: the scene, the packed file, the exact file, the report, and the page with the
+/// packed file in a viewer.
 const FILES: [&str; 5] = ["scene.ply", "scene.lexi", "scene-exact.lexi", "report.html", "scene.html"];
-/// The pictures of a view.
+/// Words for the pictures of a view in file names.
 const PARTS: [&str; 3] = ["original", "compressed", "difference"];
 
 pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
@@ -72,7 +72,8 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
         let images = [original, compressed, &difference];
         for (image, part) in images.into_iter().zip(PARTS) {
             let file = views_folder.join(view_name(pictures.len(), VIEWS, &format!("{name}_{part}")));
-            // The folder belongs to the demo, whose other files were free or may be replaced.
+            // The folder belongs to the demo. Its other files did not exist or may be replaced, so the pictures may be
+            // replaced too.
             write_picture(&file, image, true)?;
         }
         let [original, compressed, difference] = [jpeg(original)?, jpeg(compressed)?, jpeg(&difference)?];
@@ -148,7 +149,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     })
 }
 
-/// Writes a page with a viewer and the file `packed_path`, which holds `packed`.
+/// Writes a page with a viewer and the file `packed_path`. `packed` is the decoded file.
 fn write_viewer(path: &Path, packed_path: &Path, packed: &Model, common: &Common) -> Result<()> {
     let (_, bytes) = input(packed_path, common)?;
     let view = html::FirstView::new(&Scene::from(packed), "")?;
@@ -165,7 +166,7 @@ fn write_viewer(path: &Path, packed_path: &Path, packed: &Model, common: &Common
     Ok(())
 }
 
-/// Compares `compressed` with `original`. `draw` gets the name and both pictures of each view.
+/// Compares `compressed` with `original`. `draw` receives the name and both pictures of each view.
 fn compared(
     original: &Splats,
     compressed: &Model,

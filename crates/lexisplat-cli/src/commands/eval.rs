@@ -47,7 +47,7 @@ struct Scored {
 }
 
 impl Scored {
-    /// The comparisons there are, and what they are with.
+    /// Returns the comparisons that exist, each with the word for its reference.
     fn comparisons(&self) -> impl Iterator<Item = (&'static str, &Comparison)> {
         [("photos", &self.to_photos), ("original", &self.to_original)]
             .into_iter()
@@ -69,7 +69,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
     let scorer = scorer(&args.measures)?;
     let mut renderer = open_renderer(args.views.device)?;
     let drawing = DrawOptions::new(args.views.background, args.measures.eight_bit);
-    // Generated views fit the original, and all models are drawn from the same views.
+    // Generated views are made for the original, and all models are drawn from the same views.
     let original = args.original.as_deref().map(|path| load(path, common)).transpose()?;
     let first = match &original {
         Some(_) => None,
@@ -135,7 +135,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
     tell(common, &report, || table(&report))
 }
 
-/// Returns the scorer that the options mean.
+/// Returns the scorer for these options.
 pub(crate) fn scorer(measures: &Measures) -> Result<Scorer> {
     let mut scorer = Scorer::new();
     if !measures.no_flip {
@@ -147,7 +147,7 @@ pub(crate) fn scorer(measures: &Measures) -> Result<Scorer> {
     Ok(scorer)
 }
 
-/// Reads the photos of views, in order. There are none if the views have none.
+/// Reads the photos of views, in order. Returns none if the views have no photos.
 fn photos(found: &ChosenViews, background: [f32; 3], bars: &Bars) -> Result<Vec<Image>> {
     let with_photos: Vec<&View> = found.views.iter().filter(|view| view.photo.is_some()).collect();
     bars.start("reading", "photos", with_photos.len() as u64);
@@ -199,7 +199,7 @@ fn csv(scored: &[Scored]) -> Result<String> {
     Ok(out)
 }
 
-/// A field of a CSV file (RFC 4180).
+/// Returns a field of a CSV file (RFC 4180).
 fn quoted(text: &str) -> String {
     let text = &*format::csv_cell(text);
     if text.contains([',', '"', '\n', '\r']) {

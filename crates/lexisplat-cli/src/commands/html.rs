@@ -18,16 +18,16 @@ use crate::files::{check_output, input, is_pipe, output_path, siblings, tell, wr
 use crate::page::{Page, Poster};
 use crate::stop::{self, Work};
 
-/// Name of a page without a scene, and of the scene of standard input in its page.
+/// File name of a page without a scene, and name of the scene of standard input in its page.
 const VIEWER: &str = "viewer.html";
 const STANDARD_INPUT_SCENE: &str = "scene.lexi";
-/// Name of an archive of the files in a folder without a name.
+/// Name of the archive for a folder without a name.
 const BUNDLE: &str = "scene.sog";
-/// Views of the orbit whose first one is the still picture, as the viewer begins.
+/// Number of views of the orbit. The first one is the still picture, like the first view of the viewer.
 const ORBIT: usize = 24;
-/// Width and height of the still picture that is drawn, in pixels. What is right and left of it in wider windows is empty.
+/// Width and height of the drawn still picture, in pixels. In wider windows the space to its left and right is empty.
 const POSTER_SIZE: (u32, u32) = (640, 360);
-/// The first bytes of a PNG and of a JPEG.
+/// First bytes of a PNG, and of a JPEG.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
 /// Media type of a JPEG.
@@ -50,7 +50,7 @@ pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
         }
         None => None,
     };
-    // A page that cannot be shown is noticed here, not by who opens it.
+    // A page that cannot be shown is refused here, not when somebody opens it.
     for (name, bytes) in files.iter().skip(1) {
         if Kind::of(name, bytes).is_none() {
             return Err(Error::malformed(name, "the format is not known").into());
@@ -103,8 +103,8 @@ pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
     })
 }
 
-/// The name in the page of the scene that was given as `path` and is read from `file`, without folders. An archive that was
-/// made of the files of a folder has the folder's name.
+/// Returns the name in the page, without folders, of the scene that was given as `path` and is read from `file`. An
+/// archive that was made of the files of a folder has the name of the folder.
 fn scene_name(path: &Path, file: &Path, is_bundled: bool) -> String {
     if is_bundled {
         let folder = file.parent().and_then(Path::file_name);
@@ -116,16 +116,16 @@ fn scene_name(path: &Path, file: &Path, is_bundled: bool) -> String {
     }
 }
 
-/// What a page shows first. The viewer finds its own view from the parts of a scene that come first, so the page says which
-/// one the still picture was drawn from.
+/// The first view of a page. The viewer would choose its view from the parts of a scene that arrive first, so the page
+/// states the view from which the still picture was drawn.
 pub(super) struct FirstView {
-    /// The words that were given, and the very view.
+    /// The given words, and a word for exactly this view.
     pub(super) words: String,
     state: State,
 }
 
 impl FirstView {
-    /// The view of `scene` that a viewer has after `words`, which are those of a script.
+    /// Returns the view of `scene` that a viewer has after `words`, which are words of a script.
     pub(super) fn new(scene: &Scene<'_>, words: &str) -> Result<Self> {
         let cameras = orbit(scene.geometry(), ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
         let mut state = State::new([0.0; 3]);
@@ -135,7 +135,7 @@ impl FirstView {
         for command in script::parse(words)? {
             state.apply(&command);
         }
-        // A camera that was chosen becomes one that fills the window.
+        // A chosen camera becomes a free camera, whose picture fills the window.
         let pose = state.free_camera().map(|camera| camera.pose());
         let pose = pose.ok_or_else(|| anyhow::anyhow!("there is no view of the scene"))?;
         state.apply(&Command::View(pose));
@@ -144,7 +144,7 @@ impl FirstView {
         Ok(Self { words, state })
     }
 
-    /// A picture of `scene`, as a JPEG.
+    /// Returns a picture of `scene`, as a JPEG.
     pub(super) fn still(&self, scene: &Scene<'_>) -> Result<Vec<u8>> {
         let camera = self.state.camera(POSTER_SIZE.0, POSTER_SIZE.1);
         let camera = camera.ok_or_else(|| anyhow::anyhow!("there is no view of the scene"))?;
@@ -152,7 +152,7 @@ impl FirstView {
     }
 }
 
-/// The bytes and the media type of the still picture.
+/// Returns the bytes and the media type of the still picture.
 fn poster(
     args: &Html,
     scene: Option<(&SceneFile, &FirstView)>,

@@ -1,5 +1,5 @@
-//! The commands, each in a file of its own. They parse nothing and compute nothing: they call the libraries and
-//! print.
+//! The commands, each in a file of its own. They do not parse and do not compute: they call the libraries and print the
+//! results.
 
 mod bench;
 mod compare;
@@ -29,10 +29,11 @@ use crate::args::{Cli, Command, Views};
 use crate::progress;
 use crate::terminal::{note, warn};
 
-/// Most worker threads for each core. More only wait for each other, and very many of them bring a machine to a halt.
+/// Largest number of worker threads for each core. More threads only wait for each other, and very many of them can halt
+/// a machine.
 const THREADS_PER_CORE: usize = 4;
 
-/// The environment variable that chooses vector instructions by name.
+/// Environment variable with the name of the vector instructions to use.
 const SIMD_VARIABLE: &str = "LEXISPLAT_SIMD";
 
 /// Sets up threads and runs the command.
@@ -65,7 +66,7 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
     })
 }
 
-/// The vector instructions that the environment asks for, by default the widest.
+/// Returns the vector instructions that the environment asks for; by default the widest.
 fn instructions() -> Result<Simd> {
     match std::env::var_os(SIMD_VARIABLE) {
         Some(name) if !name.is_empty() => {
@@ -81,7 +82,8 @@ fn instructions() -> Result<Simd> {
     }
 }
 
-/// Returns the number of worker threads to start when `asked` are wanted, and notes it if that is less.
+/// Returns the number of worker threads to start. It is `asked`, or the largest number allowed if that is less; in this
+/// case a note is printed.
 fn allowed_threads(asked: usize) -> usize {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let most = cores.saturating_mul(THREADS_PER_CORE);
@@ -93,7 +95,7 @@ fn allowed_threads(asked: usize) -> usize {
     asked.min(most)
 }
 
-/// Returns the cameras that `views` mean for a scene, and prints what is odd about them.
+/// Returns the cameras that `views` describe for a scene, and prints warnings about them.
 fn cameras(views: &Views, scene: &Scene<'_>) -> lexisplat_compress::Result<Vec<Camera>> {
     let options = ViewOptions { offset: scene.meta().offset, ..views.options(None) };
     let found = find_views(&options, scene.geometry())?;

@@ -14,7 +14,7 @@ use crate::files::{check_free, is_pipe, load_part, make_folder, tell, view_name,
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
-/// The folder of pictures of standard input.
+/// Folder for the pictures of standard input.
 const STANDARD_INPUT_VIEWS: &str = "stdin-views";
 
 pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     })
 }
 
-/// Returns the folder for the pictures of the scene `file` if none is given.
+/// Returns the default folder for the pictures of the scene `file`.
 fn folder_for(file: &Path) -> PathBuf {
     if is_pipe(file) {
         return PathBuf::from(STANDARD_INPUT_VIEWS);

@@ -1,4 +1,4 @@
-//! Scores as a table of text.
+//! Prints scores as a table of text.
 
 use std::fmt::Write as _;
 
@@ -6,16 +6,16 @@ use anyhow::Result;
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, Summary, format};
 
-/// Narrowest column of names, in characters.
+/// Width of the narrowest column of names, in characters.
 const LEAST_NAME: usize = 8;
 
-/// A line for each view, then one for the mean, the minimum and the maximum.
+/// A table with a line for each view, then a line each for the mean, the minimum and the maximum.
 pub(super) struct ScoreTable<'a, F> {
     comparison: &'a Comparison,
-    /// Each metric with the width of its column.
+    /// Metrics, each with the width of its column.
     columns: Vec<(Metric, usize)>,
     name_width: usize,
-    /// The text of a score. Identical pictures have no PSNR.
+    /// Returns the text of a score. Identical pictures have no PSNR.
     cell: F,
 }
 

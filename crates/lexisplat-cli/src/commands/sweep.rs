@@ -21,12 +21,12 @@ use crate::files::{make_folder, note, outputs, tell};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
-/// The folder of finished parts. A folder that has it is the output of a sweep.
+/// Folder of finished parts. A folder that contains it is the output of a sweep.
 const PARTS: &str = "points";
-/// Columns of the summary with text. The others have numbers.
+/// Number of columns of the summary with text. The other columns have numbers.
 const TEXT_COLUMNS: usize = 3;
 
-/// What a sweep made.
+/// The outputs of a sweep.
 #[derive(Serialize)]
 struct Report<'a> {
     output: String,
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     tell(common, &report, || summary(folder, &results, &progress))
 }
 
-/// Refuses folders that hold something other than a sweep.
+/// Returns an error for a folder that holds something other than a sweep.
 fn check_folder(folder: &Path, overwrite: bool) -> Result<()> {
     let used = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if (used || folder.is_file()) && !folder.join(PARTS).is_dir() && !overwrite {
@@ -120,7 +120,7 @@ fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     Ok(options)
 }
 
-/// The command line, for the report, without folders of this machine.
+/// Returns the command line without folders of this machine, for the report.
 fn command() -> String {
     let shown = |word: String| match word.split_once('=') {
         Some((option, value)) if option.starts_with("--") => {
@@ -143,9 +143,9 @@ fn command() -> String {
 /// Shows the progress of a sweep, and counts its parts.
 struct Shown {
     bars: Bars,
-    /// Parts that an earlier run had finished.
+    /// Number of parts that an earlier run had finished.
     reused: AtomicU64,
-    /// Parts that this run finished.
+    /// Number of parts that this run finished.
     made: AtomicU64,
 }
 

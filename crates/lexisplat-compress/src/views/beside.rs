@@ -1,20 +1,21 @@
-//! Cameras that lie where trainers leave them.
+//! Cameras in the places where trainers leave them.
 
 use std::path::{Path, PathBuf};
 
 use lexisplat_render::{ViewSet, read_views};
 
-/// Files and folders of cameras, in the order in which they are looked for. A folder of COLMAP has one of [`COLMAP`].
+/// Names of files and folders with cameras, in the order of the search. A COLMAP folder has one of the files [`COLMAP`].
 const NAMES: [&str; 5] =
     ["cameras.json", "transforms.json", "transforms_train.json", "sparse/0", "colmap/sparse/0"];
 /// Files of a COLMAP model.
 const COLMAP: [&str; 2] = ["images.bin", "images.txt"];
-/// Folders above a scene that are looked in: its own, the one above, and the one that INRIA's trainer leaves cameras in, two
-/// above `point_cloud/iteration_N/point_cloud.ply`.
+/// Number of folders to search: the folder of the scene, the folder above, and the folder in which INRIA's trainer leaves
+/// cameras, two above that of `point_cloud/iteration_N/point_cloud.ply`.
 const FOLDERS: usize = 3;
 
-/// Returns the cameras that lie beside `scene`, one folder above it, or, if its folder is in one named `point_cloud`, two above:
-/// the nearest file `cameras.json`, `transforms.json` or `transforms_train.json`, or COLMAP's `sparse/0`. They are not read.
+/// Returns the path of the cameras beside `scene`, without reading them. The folder of the scene is searched first, then
+/// the folder above, then the folder two above if the one between is named `point_cloud`. Each is searched for
+/// `cameras.json`, `transforms.json`, `transforms_train.json`, `sparse/0` and `colmap/sparse/0`, in this order.
 #[must_use]
 pub fn cameras_beside(scene: &Path) -> Option<PathBuf> {
     // A name without a folder has an empty parent, which is the current folder.
@@ -34,8 +35,8 @@ pub fn cameras_beside(scene: &Path) -> Option<PathBuf> {
     None
 }
 
-/// Reads the cameras that [`cameras_beside`] finds, in the world of the scene. Returns where they are too; `None` if there are none
-/// or they cannot be read.
+/// Reads the cameras that [`cameras_beside`] finds, in the world of the scene. Returns their path and the cameras; `None`
+/// if there are no cameras or they cannot be read.
 #[must_use]
 pub fn read_beside(scene: &Path) -> Option<(PathBuf, ViewSet)> {
     let path = cameras_beside(scene)?;
@@ -43,14 +44,14 @@ pub fn read_beside(scene: &Path) -> Option<(PathBuf, ViewSet)> {
     Some((path, set))
 }
 
-/// The folder above `folder`; `None` above the root.
+/// Returns the folder above `folder`; `None` above the root.
 fn parent(folder: &Path) -> Option<PathBuf> {
     if folder.as_os_str().is_empty() {
         return Some(PathBuf::from(".."));
     }
     match folder.file_name() {
         Some(_) => folder.parent().map(Path::to_path_buf),
-        // `.` and `..` say nothing of what is above them.
+        // `.` and `..` do not name the folder above them.
         None if folder.has_root() => None,
         None => Some(folder.join("..")),
     }

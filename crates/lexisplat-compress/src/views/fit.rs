@@ -1,4 +1,4 @@
-//! Cameras of the size of their photos.
+//! Cameras in the sizes of their photos.
 
 use std::path::Path;
 
@@ -6,8 +6,8 @@ use lexisplat_render::Camera;
 
 use crate::error::{Error, Result};
 
-/// Largest difference between the heights of a camera and its photo, in pixels, when both are scaled to the smaller
-/// width. Sizes are rounded, some down and some up.
+/// Largest difference between the heights of a camera and its photo, in pixels, after both are scaled to the smaller of
+/// their widths. Sizes are rounded, some down and some up.
 const SHAPE_SLACK: f64 = 2.0;
 
 /// Returns `camera` with the size of its photo and the same fields of view along both axes, as in the loader of the
@@ -25,7 +25,7 @@ pub(super) fn to_photo(camera: &Camera, (width, height): (u32, u32), photo: &Pat
     Ok(camera.resized(width, height))
 }
 
-/// Returns `camera` with sides smaller by `divisor`, rounded half to even as in Python.
+/// Returns `camera` with its width and height divided by `divisor`. Halves are rounded to even, as in Python.
 pub(super) fn divided(camera: &Camera, divisor: u32) -> Camera {
     #[expect(
         clippy::cast_possible_truncation,

@@ -1,4 +1,4 @@
-//! A folder of photos, and the photo that the name of a camera means.
+//! A folder of photos, and the search for the photo of a camera by its name.
 
 use std::collections::HashMap;
 use std::fs;
@@ -9,13 +9,13 @@ use lexisplat_render::Camera;
 
 use crate::error::{Error, Result};
 
-/// Endings of photos, in lower case.
+/// Extensions of photos, in lower case.
 const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
-/// Largest photo that is looked for by the name in a file of cameras, in bytes.
+/// Largest size of a photo that is found by the name in a file of cameras, in bytes.
 const MAX_BYTES: u64 = super::photo::MAX_PHOTO_BYTES;
-/// Depth of folders that are searched. Links could make a circle.
+/// Largest depth of folders that are searched. Links could form a circle.
 const MAX_DEPTH: usize = 8;
-/// Number of files and folders that are searched at most.
+/// Largest number of files and folders that are searched.
 const MAX_ENTRIES: usize = 1_000_000;
 /// Name of the folder of full-size photos in the folder of a data set.
 const IMAGES: &str = "images";
@@ -24,17 +24,17 @@ const IMAGES: &str = "images";
 #[derive(Debug)]
 pub(super) struct PhotoFolder {
     folder: PathBuf,
-    /// Divisor that the photos' size has yet to be divided by.
+    /// Divisor by which the size of the photos is still to be divided.
     pub(super) divisor: u32,
     /// Paths in ascending order.
     photos: Vec<PathBuf>,
-    /// Indices by path in the folder, without extension.
+    /// Indices of photos by path within the folder, without extension.
     by_path: HashMap<String, Vec<usize>>,
-    /// Indices by name, without extension.
+    /// Indices of photos by file name, without extension.
     by_stem: HashMap<String, Vec<usize>>,
 }
 
-/// The photos that a name may mean.
+/// The photos that match a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Found<'a> {
     One(&'a Path),
@@ -52,8 +52,8 @@ impl<'a> Found<'a> {
 }
 
 impl PhotoFolder {
-    /// Opens `images`, or the folder `images` in it if there is one. For a divisor above 1, opens the folder of
-    /// smaller photos beside it or in it, if there is one.
+    /// Opens the folder `images`, or its sub-folder named `images` if there is one. For a divisor above 1, opens the folder
+    /// of smaller photos beside or inside that folder, if there is one.
     pub(super) fn open(images: &Path, divisor: u32) -> Result<Self> {
         let inner = images.join(IMAGES);
         let base = if inner.is_dir() { inner } else { images.to_path_buf() };
@@ -78,8 +78,9 @@ impl PhotoFolder {
         Ok(Self { folder, divisor, photos, by_path, by_stem })
     }
 
-    /// Finds the photo of the camera `name`: by the path without extension, then by ever shorter ends of that path,
-    /// then by the bare name in any folder. The extension of `name`, if any, tells several photos apart.
+    /// Finds the photo of the camera `name`. It is looked up by the path without extension, then by ever shorter ends of
+    /// that path, then by the file name in any folder. The extension of `name`, if there is one, distinguishes several
+    /// photos.
     pub(super) fn find(&self, name: &str) -> Found<'_> {
         let name = plain(name);
         let (stem, ending) = without_ending(&name);
@@ -112,8 +113,8 @@ impl PhotoFolder {
         }
     }
 
-    /// Returns the cameras that have a photo of their own, at least one, with the photos. Adds warnings about the
-    /// others.
+    /// Returns the cameras that have a photo of their own, at least one, with the paths of the photos. Adds warnings about
+    /// the other cameras.
     pub(super) fn matched(
         &self,
         cameras: Vec<Camera>,
@@ -161,7 +162,7 @@ impl PhotoFolder {
     }
 }
 
-/// The number of cameras left out for one reason, and the first of them.
+/// The number of cameras that were left out for one reason, and an example.
 #[derive(Default)]
 struct Left {
     count: usize,
@@ -182,8 +183,9 @@ impl Left {
     }
 }
 
-/// Finds the photo that a cameras file calls `name`: beside the file or below, with an extension if the name has none.
-/// Cameras come from anybody: what they name elsewhere, or what is no regular file, is none.
+/// Finds the photo that a file of cameras calls `name`, in the folder of the file or below it. If no file has the name,
+/// extensions of photos are appended. Files of cameras may come from anybody: names of files elsewhere, and of anything but
+/// regular files, are ignored.
 pub(super) fn beside(source: &Path, name: &str) -> Option<PathBuf> {
     let folder = if source.is_dir() { source } else { source.parent()? };
     let ended = |ending: &str| format!("{name}.{ending}");
@@ -194,8 +196,8 @@ pub(super) fn beside(source: &Path, name: &str) -> Option<PathBuf> {
     Some(folder.join(name?))
 }
 
-/// Finds the folder of photos smaller by `divisor`, such as `images_4`: beside the folder with the photos, or in the
-/// given folder.
+/// Finds the folder of photos that are smaller by `divisor`, such as `images_4`, beside the folder `base` of photos or in
+/// the folder `given`.
 fn smaller(given: &Path, base: &Path, divisor: u32) -> Option<PathBuf> {
     if divisor == 1 {
         return None;
@@ -205,7 +207,7 @@ fn smaller(given: &Path, base: &Path, divisor: u32) -> Option<PathBuf> {
     [beside, given.join(format!("{IMAGES}_{divisor}"))].into_iter().find(|folder| folder.is_dir())
 }
 
-/// Adds the photos of a folder in `root` and its sub-folders.
+/// Adds the photos of `folder` and its sub-folders to `photos`. All must lie in `root`.
 fn collect(
     root: &Path,
     folder: &Path,
@@ -222,18 +224,18 @@ fn collect(
                 format!("over the limit of {MAX_ENTRIES} files and folders; name the photos' folder");
             return Err(Error::format(folder, problem));
         }
-        // Names that begin with a dot are the system's: macOS leaves one for each photo.
+        // Names that begin with a dot belong to the system: macOS leaves one for each photo.
         if entry.file_name().to_string_lossy().starts_with('.') {
             continue;
         }
         let path = entry.path();
-        // This follows links. A link that leads nowhere is not a photo, nor is a pipe or a device.
+        // `metadata` follows links. A link that leads nowhere is not a photo, nor is a pipe or a device.
         let Ok(metadata) = fs::metadata(&path) else { continue };
         let is_folder = metadata.is_dir() && depth < MAX_DEPTH;
         if !(is_folder || metadata.is_file() && is_photo(&path)) {
             continue;
         }
-        // Only links lead out. Other files are not looked up once more, for there may be many.
+        // Only links can lead out of the folder. Other files are not looked up once more, because there may be many.
         if entry.file_type().map_err(io)?.is_symlink() {
             inside(root, path.strip_prefix(root).unwrap_or(&path))?;
         }

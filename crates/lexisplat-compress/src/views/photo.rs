@@ -1,4 +1,4 @@
-//! Photos as pictures.
+//! Reads photos as pictures.
 
 use std::fs::File;
 use std::io::{Cursor, Read};
@@ -11,13 +11,13 @@ use lexisplat_render::{Image, MAX_SIDE};
 use super::View;
 use crate::error::{Error, Result};
 
-/// Largest file read, in bytes: ten times what the largest camera writes.
+/// Largest file that is read, in bytes: ten times the size that the largest camera writes.
 pub(super) const MAX_PHOTO_BYTES: u64 = 512 << 20;
-/// Most memory that decoding may take, in bytes: a picture of [`MAX_SIDE`] squared with alpha.
+/// Largest memory that decoding may take, in bytes: the size of a picture with alpha of [`MAX_SIDE`] pixels a side.
 const MAX_DECODED: u64 = 4 * (MAX_SIDE as u64).pow(2);
-/// Bytes in which a size nearly always is: behind a preview and a colour profile.
+/// Number of bytes from the start that nearly always hold the size: it may follow a preview and a colour profile.
 const HEADER: u64 = 256 << 10;
-/// Markers of a JPEG: its start, the start of a scan, its end (ITU-T T.81, table B.1).
+/// Markers of a JPEG: its start, the start of a scan, and its end (ITU-T T.81, table B.1).
 const JPEG_START: [u8; 2] = [0xFF, 0xD8];
 const JPEG_SCAN: [u8; 2] = [0xFF, 0xDA];
 const JPEG_END: [u8; 2] = [0xFF, 0xD9];
@@ -30,7 +30,7 @@ fn limits() -> Limits {
     limits
 }
 
-/// Up to `limit` bytes of the file from its start.
+/// Reads up to `limit` bytes from the start of the file.
 fn start(path: &Path, limit: u64) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)
@@ -64,7 +64,7 @@ pub(super) fn size(path: &Path) -> Result<(u32, u32)> {
     match reader(path, head)?.into_dimensions() {
         Ok(size) => Ok(size),
         Err(error) if whole => Err(refused(path, &error)),
-        // A long header.
+        // The header is longer than the bytes read.
         Err(_) => reader(path, all(path)?)?.into_dimensions().map_err(|e| refused(path, &e)),
     }
 }
@@ -104,8 +104,8 @@ pub fn photo(view: &View, background: [f32; 3]) -> Result<Image> {
     Ok(Image::from_8bit(width, height, &pixels)?)
 }
 
-/// Returns whether `bytes` are a JPEG without an end after its last scan. The decoder would fill the rest with grey.
-/// Neither marker occurs within a scan.
+/// Returns whether `bytes` are a JPEG without an end marker after its last scan. The decoder would fill the missing part
+/// with grey. Neither marker occurs within a scan.
 fn is_cut_jpeg(bytes: &[u8]) -> bool {
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     bytes.starts_with(&JPEG_START) && last(JPEG_END) <= last(JPEG_SCAN)

@@ -5,20 +5,20 @@ use serde::Deserialize;
 
 use crate::error::{Error, Result};
 
-/// For sources without a split, every 8th camera in the order of names is a test view, beginning with the first:
-/// the convention of the field (INRIA `scene/dataset_readers.py`, `llffhold`).
+/// Period of test views in sources without a split: every 8th camera in the order of names is a test view, beginning with
+/// the first. This is the convention of the field (INRIA `scene/dataset_readers.py`, `llffhold`).
 pub const DEFAULT_HOLD: usize = 8;
 
-/// The views of a source that are used.
+/// The views of a source that are to be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitFilter {
     /// All views.
     #[default]
     All,
-    /// Views marked `train`. If no view is marked with a split, views that are not held out.
+    /// Views marked `train`. If no view is marked with a split: views that are not held out as test views.
     Train,
-    /// Views marked `test`. If no view is marked with a split, views that are held out.
+    /// Views marked `test`. If no view is marked with a split: views that are held out as test views.
     Test,
 }
 
@@ -48,8 +48,8 @@ impl SplitFilter {
     }
 }
 
-/// Returns the cameras that `filter` lets through, at least one, in their order. If no camera is marked, every
-/// `hold`-th in the order of names counts as a test camera and the others as training cameras.
+/// Returns the cameras that `filter` lets through, at least one, in their order. If no camera is marked, every `hold`-th
+/// camera in the order of names counts as a test camera, and the others as training cameras.
 pub(super) fn filter(mut cameras: Vec<Camera>, filter: SplitFilter, hold: usize) -> Result<Vec<Camera>> {
     if hold == 0 {
         return Err(Error::parameter("hold", hold, "1 or more"));
@@ -64,7 +64,7 @@ pub(super) fn filter(mut cameras: Vec<Camera>, filter: SplitFilter, hold: usize)
     if cameras.is_empty() { Err(filter.none_left(count)) } else { Ok(cameras) }
 }
 
-/// Returns generated cameras if `filter` lets all through. They have no split.
+/// Returns generated cameras if `filter` lets all cameras through. Generated cameras have no split.
 pub(super) fn unmarked(cameras: Vec<Camera>, filter: SplitFilter) -> Result<Vec<Camera>> {
     if cameras.is_empty() || filter != SplitFilter::All {
         return Err(filter.none_left(cameras.len()));

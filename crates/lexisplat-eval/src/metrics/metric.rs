@@ -15,19 +15,19 @@ pub enum Metric {
     Ssim,
     /// NVIDIA's FLIP: 0 for pictures that look the same, at most 1.
     Flip,
-    /// LPIPS with VGG16, as the `lpips` package computes it: pictures scaled to -1..1 first.
+    /// LPIPS with VGG16 as in the `lpips` package: pictures are scaled to -1..1.
     LpipsVgg,
-    /// LPIPS with VGG16, as `metrics.py` of the 3DGS repository computes it: pictures left in 0..1. This is not the
-    /// standard value, but tables of 3DGS papers print it.
+    /// LPIPS with VGG16 as in `metrics.py` of the 3DGS repository: pictures stay in 0..1. This is not the standard value,
+    /// but tables of 3DGS papers have it.
     LpipsVggInria,
-    /// LPIPS with `AlexNet`, as the `lpips` package computes it.
+    /// LPIPS with `AlexNet` as in the `lpips` package: pictures are scaled to -1..1.
     LpipsAlex,
-    /// LPIPS with `AlexNet` of pictures left in 0..1.
+    /// LPIPS with `AlexNet` of pictures that stay in 0..1.
     LpipsAlexInria,
 }
 
 impl Metric {
-    /// All of them, in the order of tables.
+    /// All metrics, in the order of tables.
     pub const ALL: [Self; 7] = [
         Self::Psnr,
         Self::Ssim,
@@ -38,7 +38,7 @@ impl Metric {
         Self::LpipsAlexInria,
     ];
 
-    /// The name in files, and the name for people.
+    /// Returns the name in files, and the name for people.
     fn names(self) -> (&'static str, &'static str) {
         match self {
             Self::Psnr => ("psnr", "PSNR"),

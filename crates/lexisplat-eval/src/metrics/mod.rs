@@ -1,5 +1,5 @@
-//! Differences between two pictures. Values are clipped to 0..1 first; [`outside`] tells whether any is outside. Pictures
-//! with NaN are refused. Nothing is rounded to 8 bits.
+//! Differences between two pictures. Values are first clipped to 0..1; [`outside`] tells whether there are values outside
+//! of this range. Pictures with NaN are refused. Nothing is rounded to 8 bits.
 
 mod flip;
 pub mod lpips;
@@ -18,8 +18,8 @@ use lexisplat_render::Image;
 
 use lexisplat_compress::{Error, Result};
 
-/// The least and largest value of `image`, if one of them is outside of 0..1: metrics clip such values. Pictures of scenes
-/// may have some; values up to 255 mean that the picture should be divided by 255.
+/// Returns the smallest and largest value of `image` if one of them is outside of 0..1, where metrics clip. Pictures of
+/// scenes may have such values. Values up to 255 mean that the picture should be divided by 255.
 #[must_use]
 pub fn outside(image: &Image) -> Option<[f32; 2]> {
     let ends = [f32::INFINITY, f32::NEG_INFINITY];
@@ -34,11 +34,12 @@ pub(crate) fn clip(value: f32) -> f32 {
     if value > 0.0 { value.min(1.0) } else { 0.0 }
 }
 
-/// Refuses two pictures of different sizes, pictures whose pixels do not fill them, and those with NaN.
+/// Returns an error for two pictures of different sizes, for pictures whose number of pixels does not match their size,
+/// and for pictures with NaN.
 fn comparable(a: &Image, b: &Image) -> Result<()> {
     same_size(a, b)?;
     for image in [a, b] {
-        // Without a way out the loop is vectorised.
+        // The loop has no early exit, so that it is vectorised.
         let has_nan = image.pixels.as_flattened().iter().fold(false, |found, v| found | v.is_nan());
         let is_nan = |pixel: &[f32; 3]| pixel.iter().any(|v| v.is_nan());
         if let Some(i) = image.pixels.iter().position(is_nan).filter(|_| has_nan) {
@@ -50,7 +51,8 @@ fn comparable(a: &Image, b: &Image) -> Result<()> {
     Ok(())
 }
 
-/// Refuses two pictures of different sizes, and pictures whose pixels do not fill them.
+/// Returns an error for two pictures of different sizes, and for pictures whose number of pixels does not match their
+/// size.
 fn same_size(a: &Image, b: &Image) -> Result<()> {
     let describe = |image: &Image| format!("{} x {}", image.width, image.height);
     if (a.width, a.height) != (b.width, b.height) {

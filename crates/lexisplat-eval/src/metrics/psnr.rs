@@ -6,8 +6,8 @@ use lexisplat_render::{Image, squared_error};
 use super::comparable;
 use lexisplat_compress::Result;
 
-/// Returns the PSNR in dB: `-10 log10` of the mean squared error over all pixels and channels, for a peak of 1.
-/// Returns `None` if the clipped pictures are identical: their PSNR is infinite.
+/// Returns the PSNR in dB, `-10 log10(mse)`, where `mse` is the mean squared error over all pixels and channels, for a
+/// peak of 1. Returns `None` if the clipped pictures are identical, because the PSNR is then infinite.
 ///
 /// # Errors
 /// [`lexisplat_compress::Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.

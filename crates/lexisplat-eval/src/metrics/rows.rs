@@ -1,11 +1,11 @@
-//! Separable filters over pictures, one output row at a time: first along columns, then along the row. All sums are in
+//! Separable filters over pictures, one output row at a time: first down the columns, then along the row. All sums are in
 //! `f64` and in a fixed order, so any thread may compute a row.
 
 use lexisplat_render::Image;
 use rayon::prelude::*;
 
-/// Returns the sum of `row` over `rows`. Rows run in parallel, each with scratch memory of its thread, and are added
-/// from the first on.
+/// Returns the sum of the results of `row` over `rows`. Rows are computed in parallel, each with the scratch memory of
+/// its thread. Their results are added in the order of the rows.
 pub(super) fn sum_rows<S>(
     rows: std::ops::Range<usize>,
     scratch: impl Fn() -> S + Sync + Send,
@@ -37,11 +37,11 @@ pub(super) fn planes<T: Copy + Default + Send + Sync>(
     [first, second, third]
 }
 
-/// Sums that are kept in registers while all weights are added to them.
+/// Number of sums that are kept in registers while all weights are added to them.
 const BLOCK: usize = 16;
 
-/// Adds the rows that `row` returns, each times the weight of its number, to `sums`. Rows are at least as long as
-/// `sums`.
+/// Adds the rows that `row` returns to `sums`. The row of each number is multiplied by the weight of this number. Rows
+/// must be at least as long as `sums`.
 #[inline(always)]
 pub(super) fn add_rows<'a>(sums: &mut [f64], weights: &[f64], row: impl Fn(usize) -> &'a [f64]) {
     let len = sums.len();
@@ -64,8 +64,7 @@ pub(super) fn add_rows<'a>(sums: &mut [f64], weights: &[f64], row: impl Fn(usize
     }
 }
 
-/// Adds the correlation of `padded` with `weights` to `sums`. `padded` is longer than `sums` by the number of weights
-/// less one.
+/// Adds the correlation of `padded` with `weights` to `sums`. The length of `padded` is `sums.len() + weights.len() - 1`.
 #[inline(always)]
 pub(super) fn add_across(sums: &mut [f64], weights: &[f64], padded: &[f64]) {
     add_rows(sums, weights, |k| &padded[k..]);

@@ -1,4 +1,4 @@
-//! Structural similarity, as the 3DGS papers compute it and as image libraries do.
+//! Structural similarity, in the variant of the 3DGS papers and in that of image libraries.
 
 use lexisplat::simd::Simd;
 use lexisplat_render::Image;
@@ -9,28 +9,29 @@ use lexisplat_compress::{Error, Result};
 
 /// Side of the Gaussian window in pixels (INRIA `utils/loss_utils.py`, `window_size`).
 const WINDOW: usize = 11;
-/// Standard deviation of the window in pixels (the same file, `gaussian`).
+/// Standard deviation of the window in pixels (`gaussian` in the same file).
 const SIGMA: f64 = 1.5;
 /// Stabiliser of the luminance term, `(0.01 peak)^2`.
 const C1: f64 = 0.01 * 0.01;
 /// Stabiliser of the contrast term, `(0.03 peak)^2`.
 const C2: f64 = 0.03 * 0.03;
-/// Pixels the window reaches to each side.
+/// Distance from the centre to the border of the window, in pixels.
 const REACH: usize = WINDOW / 2;
-/// Number of blurred quantities: both means, the sum of both squares, the product. No formula needs each square.
+/// Number of blurred quantities: both means, the sum of both squares, and the product. No formula needs the squares one
+/// by one.
 const MAPS: usize = 4;
 
-/// Treatment of pixels whose window leaves the picture.
+/// Treatment of pixels whose window extends beyond the picture.
 #[derive(Clone, Copy, PartialEq)]
 enum Border {
-    /// Outside the picture everything is 0.
+    /// Pixels outside of the picture are 0.
     Zero,
-    /// Such pixels do not count.
+    /// Pixels with such a window do not count.
     Cut,
 }
 
-/// Returns the SSIM, averaged over all pixels and channels: window of 11 x 11, sigma 1.5, zero padding. Identical
-/// pictures have 1, the largest value.
+/// Returns the SSIM, averaged over all pixels and channels, with a window of 11 x 11, sigma 1.5 and zero padding. It is
+/// 1, the largest value, for identical pictures.
 ///
 /// # Errors
 /// [`Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
@@ -39,11 +40,11 @@ pub fn ssim(a: &Image, b: &Image) -> Result<f64> {
     Ok(mean(a, b, Border::Zero))
 }
 
-/// Returns the SSIM over the pixels whose window lies within the picture, as in the paper of Wang et al. (2004) and
-/// scikit-image with `gaussian_weights`. Tables of 3DGS papers print [`ssim`].
+/// Returns the SSIM over the pixels whose window lies within the picture, as in the paper of Wang et al. (2004) and in
+/// scikit-image with `gaussian_weights`. Tables of 3DGS papers have [`ssim`] instead.
 ///
 /// # Errors
-/// [`Error::Parameter`] if the sizes differ or a picture is smaller than 11 pixels either way.
+/// [`Error::Parameter`] if the sizes differ or a side of a picture is smaller than 11 pixels.
 pub fn ssim_inner(a: &Image, b: &Image) -> Result<f64> {
     comparable(a, b)?;
     if (a.width.min(a.height) as usize) < WINDOW {
@@ -84,9 +85,9 @@ fn mean(a: &Image, b: &Image, border: Border) -> f64 {
 
 /// Blurred quantities of one row of one channel.
 struct Scratch {
-    /// Blurred down the columns; [`REACH`] zeros lie to each side.
+    /// Quantities blurred down the columns, with [`REACH`] zeros to each side.
     down: [Vec<f64>; MAPS],
-    /// Blurred along columns and rows.
+    /// Quantities blurred along columns and rows.
     across: [Vec<f64>; MAPS],
 }
 

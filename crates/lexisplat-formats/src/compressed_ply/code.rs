@@ -1,36 +1,36 @@
-//! The codes of compressed.ply: values of 32 bits beside the bounds of a chunk (splat-transform, `compressed-chunk.ts` and
-//! `decompress-ply.ts`).
+//! The codes of compressed.ply: values of 32 bits, relative to the bounds of a chunk (splat-transform,
+//! `compressed-chunk.ts` and `decompress-ply.ts`).
 
 use crate::settle::settled;
 
-/// Least and largest value of a chunk along each axis, or of each colour.
+/// Smallest and largest value of a chunk, along each axis or of each colour channel.
 pub(super) type Bounds = [[f32; 3]; 2];
 
-/// Bits of three values in 32, the first one on top.
+/// Number of bits of each of three values in 32 bits. The first value has the highest bits.
 const BITS: [u32; 3] = [11, 10, 11];
-/// Bits of a component of a rotation.
+/// Number of bits of a component of a rotation.
 const TURN_BITS: u32 = 10;
-/// Half of the range of these components, which is from -1 / sqrt 2 to 1 / sqrt 2, times the square root of 2.
+/// Half of the range of these components, divided by the square root of 2. The range is from -1 / sqrt 2 to 1 / sqrt 2.
 const TURN_HALF: f64 = 0.5;
 
-/// The largest number of `bits` bits.
+/// Returns the largest number of `bits` bits.
 fn most(bits: u32) -> f64 {
     f64::from((1_u32 << bits) - 1)
 }
 
-/// `share` of 0 to 1 as a number of `bits` bits.
+/// Returns `share`, from 0 to 1, as a number of `bits` bits.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited")]
 pub(super) fn to_bits(share: f64, bits: u32) -> u32 {
     (share * most(bits) + 0.5).floor().clamp(0.0, most(bits)) as u32
 }
 
-/// The value between `low` and `high` at `share`.
+/// Returns the value at `share` between `low` and `high`.
 #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
 fn between(low: f32, high: f32, share: f64) -> f32 {
     (f64::from(low) * (1.0 - share) + f64::from(high) * share) as f32
 }
 
-/// The code of `bits` bits of `value` between `low` and `high`, whose decoding has the same code.
+/// Returns the code of `value` between `low` and `high`, in `bits` bits. The decoded value has the same code again.
 pub(super) fn to_code(value: f32, low: f32, high: f32, bits: u32) -> u32 {
     let once = |value: f32| {
         let range = f64::from(high) - f64::from(low);
@@ -39,24 +39,25 @@ pub(super) fn to_code(value: f32, low: f32, high: f32, bits: u32) -> u32 {
     settled(once(value), |code| once(of_code(code, low, high, bits)))
 }
 
-/// The value between `low` and `high` of a code of `bits` bits.
+/// Returns the value of a code of `bits` bits, between `low` and `high`.
 pub(super) fn of_code(code: u32, low: f32, high: f32, bits: u32) -> f32 {
     between(low, high, f64::from(code) / most(bits))
 }
 
-/// Three values of a code of 32 bits.
+/// Returns the three values of a code of 32 bits.
 pub(super) fn three(code: u32, [low, high]: &Bounds) -> [f32; 3] {
     let codes = [code >> 21, code >> 11 & 0x3ff, code & 0x7ff];
     [0, 1, 2].map(|k| of_code(codes[k], low[k], high[k], BITS[k]))
 }
 
-/// The code of three values.
+/// Returns the code of three values, in 32 bits.
 pub(super) fn to_three(values: [f32; 3], [low, high]: &Bounds) -> u32 {
     let [a, b, c] = [0, 1, 2].map(|k| to_code(values[k], low[k], high[k], BITS[k]));
     a << 21 | b << 11 | c
 }
 
-/// The rotation (w, x, y, z) of a code: 2 bits for the place of the largest component in this order, 10 for each other.
+/// Returns the rotation (w, x, y, z) of a code. The code has 2 bits for the place of the largest component in this order,
+/// and 10 bits for each of the others.
 #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
 pub(super) fn rotation(code: u32) -> [f32; 4] {
     let place = (code >> 30) as usize;
@@ -72,7 +73,7 @@ pub(super) fn rotation(code: u32) -> [f32; 4] {
     parts.map(|v| v as f32)
 }
 
-/// The code of a rotation (w, x, y, z), whose decoding has the same code.
+/// Returns the code of a rotation (w, x, y, z). The decoded rotation has the same code again.
 pub(super) fn to_rotation(turn: [f32; 4]) -> u32 {
     settled(once(turn), |code| once(rotation(code)))
 }

@@ -1,5 +1,5 @@
-//! `PlayCanvas`' compressed PLY: 16 bytes a Gaussian beside the bounds of each chunk of 256, and a byte for each SH
-//! coefficient (splat-transform, `write-compressed-ply.ts` and `decompress-ply.ts`).
+//! `PlayCanvas`' compressed PLY. A Gaussian has 16 bytes, relative to the bounds of its chunk of 256 Gaussians, and a
+//! byte for each SH coefficient (splat-transform, `write-compressed-ply.ts` and `decompress-ply.ts`).
 
 mod code;
 mod order;
@@ -18,9 +18,9 @@ use crate::rows::{Described, Rows, RowsMut};
 
 pub(crate) use self::write::write;
 
-/// Gaussians of a chunk.
+/// Number of Gaussians of a chunk.
 const CHUNK: usize = 256;
-/// Properties of a chunk, all of them floats; files without the bounds of colours have the first 12.
+/// Properties of a chunk, all of them floats. Files without the bounds of colours have the first 12.
 const CHUNK_PROPERTIES: [&str; 18] = [
     "min_x",
     "min_y",
@@ -41,18 +41,18 @@ const CHUNK_PROPERTIES: [&str; 18] = [
     "max_g",
     "max_b",
 ];
-/// Those of them that every file has.
+/// Number of the properties that every file has.
 const NEEDED: usize = 12;
-/// Properties of a Gaussian, all of them u32.
+/// Properties of a Gaussian, all of type `u32`.
 const VERTEX_PROPERTIES: [&str; 4] = ["packed_position", "packed_rotation", "packed_scale", "packed_color"];
-/// Bytes of a Gaussian's properties.
+/// Number of bytes of a Gaussian's properties.
 const ROW: usize = 16;
-/// Range of an SH coefficient, around 0.
+/// Size of the range of an SH coefficient, which is centred at 0.
 const SH_RANGE: f32 = 8.0;
-/// Values of a byte of an SH coefficient.
+/// Number of values of the byte of an SH coefficient.
 const SH_LEVELS: f32 = 256.0;
 
-/// Whether the PLY in `bytes` has packed elements.
+/// Returns whether the PLY in `bytes` has packed elements.
 pub(crate) fn is_likely(bytes: &[u8]) -> bool {
     let is_packed = |header: Header| {
         header
@@ -63,7 +63,7 @@ pub(crate) fn is_likely(bytes: &[u8]) -> bool {
     Header::parse("", bytes, &Limits::default()).is_ok_and(is_packed)
 }
 
-/// Largest bound with which every value is finite: base colours are divided by [`C0`].
+/// Largest bound with which every decoded value is finite. Base colours are divided by [`C0`].
 const MOST_BOUND: f32 = f32::MAX / 8.0;
 
 /// The rows of an element.
@@ -143,7 +143,7 @@ pub(crate) fn read<'a>(name: &str, bytes: &'a [u8], options: &ReadOptions) -> Re
     })
 }
 
-/// Refuses an element that has other properties than these, in this order.
+/// Returns an error if an element does not have exactly these properties, in this order.
 fn expect(
     name: &str,
     what: &str,
@@ -168,12 +168,12 @@ fn expect(
 struct ChunkBounds {
     positions: Bounds,
     scales: Bounds,
-    /// Of base colours, 0 to 1 if they are between black and white.
+    /// Bounds of base colours, within 0 to 1 if the colours are between black and white.
     colours: Bounds,
 }
 
 impl ChunkBounds {
-    /// The bounds of a row of 12 or 18 values.
+    /// Returns the bounds in a row of 12 or 18 values.
     fn of(row: &[f32]) -> Self {
         let three = |at: usize| row.get(at..).and_then(|rest| rest.first_chunk()).copied();
         let bounds = |at: usize| three(at).zip(three(at + 3)).map(|(low, high)| [low, high]);
@@ -185,13 +185,13 @@ impl ChunkBounds {
         }
     }
 
-    /// As a row of 18 values.
+    /// Returns the bounds as a row of 18 values.
     fn values(&self) -> impl Iterator<Item = f32> {
         [self.positions, self.scales, self.colours].into_iter().flatten().flatten()
     }
 }
 
-/// The SH coefficient 0 of a base colour, and back.
+/// Returns SH coefficient 0 of a base colour.
 fn dc(colour: f32) -> f32 {
     (colour - COLOUR_OFFSET) / C0
 }
@@ -200,7 +200,7 @@ fn colour(dc: f32) -> f32 {
     dc * C0 + COLOUR_OFFSET
 }
 
-/// The value of a byte of SH.
+/// Returns the SH coefficient of a byte.
 fn coefficient(byte: u8) -> f32 {
     let share = match byte {
         0 => 0.0,
@@ -215,7 +215,7 @@ struct CompressedRows<'a> {
     bounds: Vec<ChunkBounds>,
     vertices: &'a [[u8; ROW]],
     sh: &'a [u8],
-    /// SH coefficients of a Gaussian, of all colours.
+    /// Number of SH-rest coefficients of a Gaussian, of all channels.
     rest: usize,
     is_finite: bool,
 }

@@ -1,22 +1,22 @@
-//! The order of Gaussians in which chunks are small.
+//! Chooses an order of Gaussians in which chunks are small.
 
 use super::CHUNK;
 
-/// Bits of a Morton code along each axis.
+/// Number of bits of a Morton code along each axis.
 const BITS: u32 = 10;
-/// How much larger chunks in the given order may be than in sorted order, for the order to be kept. With it, what was
-/// written is written again in its own order.
+/// Largest ratio of the size of chunks in the given order to their size in sorted order at which the given order is kept.
+/// A file that is read and written again therefore keeps its order.
 const KEPT: f64 = 1.1;
 
-/// The order in which to write Gaussians at `positions`: as they are if that makes chunks about as small as sorting them by
-/// Morton code.
+/// Returns the order in which to write Gaussians at `positions`: the given order if its chunks are about as small as
+/// those in the order of Morton codes, otherwise the order of Morton codes.
 pub(crate) fn order(positions: &[[f32; 3]]) -> Vec<usize> {
     let kept: Vec<usize> = (0..positions.len()).collect();
     let sorted = sorted(positions);
     if size(positions, &kept) <= KEPT * size(positions, &sorted) { kept } else { sorted }
 }
 
-/// The sum of the extents of all chunks along all axes.
+/// Returns the sum of the extents of all chunks along all axes.
 fn size(positions: &[[f32; 3]], order: &[usize]) -> f64 {
     let extent = |chunk: &[usize]| -> f64 {
         let axis = |k: usize| {
@@ -29,7 +29,8 @@ fn size(positions: &[[f32; 3]], order: &[usize]) -> f64 {
     order.chunks(CHUNK).map(extent).sum()
 }
 
-/// Gaussians by Morton code within the bounds of all. Those of equal codes keep their order.
+/// Returns Gaussians in the order of their Morton codes within the bounds of all positions. Gaussians of equal codes keep
+/// their order.
 pub(crate) fn sorted(positions: &[[f32; 3]]) -> Vec<usize> {
     let bounds = [0, 1, 2].map(|k| {
         let values = positions.iter().map(|p| f64::from(p[k]));

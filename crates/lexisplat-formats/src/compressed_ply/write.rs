@@ -10,7 +10,7 @@ use super::{CHUNK, CHUNK_PROPERTIES, ChunkBounds, ROW, SH_LEVELS, SH_RANGE, VERT
 use crate::opacity::{sigmoid, to_byte};
 use crate::write::Lost;
 
-/// Largest logarithm of a scale, either way (`compressed-chunk.ts`).
+/// Largest absolute logarithm of a scale (`compressed-chunk.ts`).
 const MOST_LOG_SCALE: f32 = 20.0;
 
 /// Writes `splats` as a compressed PLY, with SH of degree 3 at most.
@@ -50,7 +50,7 @@ pub(crate) fn write(splats: &Splats) -> (Vec<u8>, Lost) {
 fn header(splats: &Splats, degree: ShDegree, count: usize) -> String {
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
     let mut line = |words: std::fmt::Arguments<'_>| {
-        // Writing to a string cannot fail.
+        // Writing to a `String` cannot fail.
         let _ = text.write_fmt(words);
         text.truncate(text.trim_end().len());
         text.push('\n');
@@ -70,7 +70,7 @@ fn header(splats: &Splats, degree: ShDegree, count: usize) -> String {
     text
 }
 
-/// The bounds of the Gaussians of a chunk.
+/// Returns the bounds of the Gaussians of a chunk.
 fn bounds_of(geometry: &Geometry, chunk: &[usize]) -> ChunkBounds {
     let bounds = |value: &dyn Fn(usize) -> [f32; 3]| -> Bounds {
         chunk.iter().fold([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]], |[low, high], &i| {
@@ -78,7 +78,8 @@ fn bounds_of(geometry: &Geometry, chunk: &[usize]) -> ChunkBounds {
             [[0, 1, 2].map(|k| low[k].min(v[k])), [0, 1, 2].map(|k| high[k].max(v[k]))]
         })
     };
-    // The colour that a reader's SH coefficient has again, so that it is the bound when the file is written again.
+    // A bound is replaced by the colour that follows from a reader's SH coefficient, so that the bound is the same when
+    // the file is written again.
     let same = |mut bound: f32| {
         for _ in 0..4 {
             bound = colour(dc(bound));
@@ -92,7 +93,7 @@ fn bounds_of(geometry: &Geometry, chunk: &[usize]) -> ChunkBounds {
     }
 }
 
-/// Appends the row of Gaussian `i`. Adds how many values are out of range.
+/// Appends the row of Gaussian `i`. Adds the number of values that are out of range to `limited`.
 fn push_row(bytes: &mut Vec<u8>, geometry: &Geometry, i: usize, bounds: &ChunkBounds, limited: &mut u64) {
     let scales = geometry.scales[i];
     *limited += scales.iter().filter(|v| v.abs() > MOST_LOG_SCALE).count() as u64;
@@ -106,7 +107,7 @@ fn push_row(bytes: &mut Vec<u8>, geometry: &Geometry, i: usize, bounds: &ChunkBo
     bytes.extend([opacity, b, g, r]);
 }
 
-/// The byte of an SH coefficient.
+/// Returns the byte of an SH coefficient.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to 8 bits")]
 fn to_coefficient(value: f32, limited: &mut u64) -> u8 {
     *limited += u64::from(value.abs() > SH_RANGE / 2.0);

@@ -7,7 +7,8 @@ use lexisplat::{Error, Result};
 use super::buffers::{Buffers, Span, missing};
 use super::document::{Document, Shape};
 
-/// What a number is stored as, by `componentType`, and whether it stands for a share of its largest value.
+/// Type of a stored number, from `componentType`, and whether the number is normalised: a share of the largest value of
+/// its type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Component {
     I8,
@@ -32,7 +33,7 @@ impl Component {
             (5122, true) => Self::I16Share,
             (5123, false) => Self::U16,
             (5123, true) => Self::U16Share,
-            // A float is never normalized.
+            // Floats are never normalised.
             (5126, _) => Self::F32,
             _ => return None,
         })
@@ -46,7 +47,7 @@ impl Component {
         }
     }
 
-    /// Half of the smallest number above 0.
+    /// Returns half of the smallest number above 0.
     pub(super) fn half_step(self) -> f64 {
         match self {
             Self::I8 | Self::U8 | Self::I16 | Self::U16 => 0.5,
@@ -59,11 +60,11 @@ impl Component {
     }
 }
 
-/// Numbers that are all there.
+/// An accessor whose numbers are all in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Accessor {
     span: Span,
-    /// Bytes from one element to the next.
+    /// Distance of consecutive elements, in bytes.
     stride: usize,
     pub(super) component: Component,
     /// Number of elements.
@@ -71,10 +72,11 @@ pub(super) struct Accessor {
 }
 
 impl Accessor {
-    /// Accessor `index`, which is that of `attribute`, of elements of `shape` and numbers of one of `components`.
+    /// Returns accessor `index`, which belongs to `attribute`. Its elements must have the `shape`, and its numbers one of
+    /// `components`.
     ///
     /// # Errors
-    /// [`Error::Format`] for other numbers, and for elements that are not all there.
+    /// [`Error::Format`] for other numbers, and for elements that are not all in the file.
     pub(super) fn check(
         name: &str,
         document: &Document<'_>,
@@ -117,14 +119,14 @@ impl Accessor {
             let text = format!("ends at byte {end} of bufferView {view}, which has {}", span.length);
             return Err(malformed(text));
         }
-        // All of them are within the span.
+        // All three values are at most the length of the span.
         let [offset, stride, count] =
             [entry.byte_offset, stride, entry.count].map(|v| usize::try_from(v).unwrap_or(usize::MAX));
         let span = Span { start: span.start + offset, length: span.length - offset, ..span };
         Ok(Self { span, stride, component, count })
     }
 
-    /// Calls `put` with the place in `range` and the `N` numbers of each of the elements `range`.
+    /// Calls `put` for each element of `range`, with its place in `range` and its `N` numbers.
     pub(super) fn read<const N: usize>(
         &self,
         buffers: &Buffers<'_>,
@@ -175,7 +177,7 @@ impl Elements<'_> {
 }
 
 impl Shape {
-    /// Numbers of an element.
+    /// Returns the number of values of an element.
     pub(super) fn numbers(self) -> usize {
         match self {
             Self::Scalar | Self::Other => 1,

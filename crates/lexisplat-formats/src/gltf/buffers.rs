@@ -1,4 +1,4 @@
-//! The bytes of buffers: the BIN chunk of a glb, and data in base64. Nothing else is opened.
+//! The bytes of buffers: the BIN chunk of a glb, and data in base64. No other file is opened.
 
 use std::borrow::Cow;
 
@@ -9,21 +9,21 @@ use lexisplat::{Error, FormatError, Result};
 
 use super::document::{Document, View};
 
-/// Base64 as writers differ in it: with padding at its end or without.
+/// Base64 with or without padding at its end, because writers differ.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &alphabet::STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
 );
-/// Most characters of an address in a message.
+/// Largest number of characters of an address in a message.
 const SHOWN: usize = 64;
 
-/// The buffers of a file that views were taken of.
+/// The buffers of a file that are used by some views.
 #[derive(Debug)]
 pub(super) struct Buffers<'a> {
     bytes: Vec<Option<Cow<'a, [u8]>>>,
 }
 
-/// Bytes of a buffer that are there.
+/// A range of bytes in a buffer, which exists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) buffer: usize,
@@ -32,10 +32,10 @@ pub(super) struct Span {
 }
 
 impl<'a> Buffers<'a> {
-    /// Takes the bytes of those buffers that bufferViews `views` are of.
+    /// Loads the buffers that the bufferViews `views` use.
     ///
     /// # Errors
-    /// [`Error::Format`] for a buffer outside of the file, or of another length.
+    /// [`Error::Format`] for a buffer outside of the file, or of another length than stated.
     pub(super) fn load(
         name: &str,
         document: &Document<'_>,
@@ -54,10 +54,10 @@ impl<'a> Buffers<'a> {
         Ok(Self { bytes })
     }
 
-    /// The bytes of bufferView `view`, and its stride.
+    /// Returns the bytes of bufferView `view`, and its stride.
     ///
     /// # Errors
-    /// [`Error::Format`] if they are not all there.
+    /// [`Error::Format`] if the bytes are not all in the buffer.
     pub(super) fn view(
         &self,
         name: &str,
@@ -83,14 +83,14 @@ impl<'a> Buffers<'a> {
         Ok((Span { buffer: entry.buffer, start, length: end - start }, entry.byte_stride))
     }
 
-    /// The bytes of `span`, which [`Self::view`] gave.
+    /// Returns the bytes of `span`, which must come from [`Self::view`].
     pub(super) fn get(&self, span: Span) -> &[u8] {
         let bytes = self.bytes.get(span.buffer).and_then(Option::as_deref).unwrap_or_default();
         bytes.get(span.start..).and_then(|rest| rest.get(..span.length)).unwrap_or_default()
     }
 }
 
-/// Says that `what` number `index` is named and not there.
+/// Returns the error for `what` number `index`, which is referenced but does not exist.
 pub(super) fn missing(name: &str, what: &str, index: usize) -> Error {
     Error::malformed(name, format!("{what} {index} does not exist"))
 }
@@ -99,7 +99,7 @@ fn view_of<'d>(name: &str, document: &'d Document<'_>, view: usize) -> Result<&'
     document.buffer_views.get(view).ok_or_else(|| missing(name, "bufferView", view))
 }
 
-/// The bytes of buffer `index`, which exists.
+/// Returns the bytes of buffer `index`, which must exist.
 fn load<'a>(
     name: &str,
     document: &Document<'_>,
@@ -123,7 +123,7 @@ fn load<'a>(
     Ok(bytes)
 }
 
-/// The bytes in the data URI `uri` (RFC 2397).
+/// Returns the bytes in the data URI `uri` (RFC 2397).
 fn decode(name: &str, index: usize, uri: &str) -> Result<Vec<u8>> {
     let scheme = uri.get(..5).filter(|scheme| scheme.eq_ignore_ascii_case("data:"));
     if scheme.is_none() {

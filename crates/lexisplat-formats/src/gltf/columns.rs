@@ -1,4 +1,4 @@
-//! The numbers of splats that are not compressed.
+//! The values of splats that are not compressed.
 
 use std::ops::Range;
 
@@ -14,14 +14,14 @@ use crate::rows::RowsMut;
 
 use Component::{F32, I8, I8Share, I16, I16Share, U8, U8Share, U16, U16Share};
 
-/// What the numbers of positions may be, with `KHR_mesh_quantization`.
+/// Types that the numbers of positions may have, with `KHR_mesh_quantization`.
 const POSITION: &[Component] = &[F32, I8, I8Share, U8, U8Share, I16, I16Share, U16, U16Share];
 const ROTATION: &[Component] = &[F32, I8Share, I16Share];
 const SCALE: &[Component] = &[F32, U8, U8Share, U16, U16Share];
 const OPACITY: &[Component] = &[F32, U8Share, U16Share];
 const HARMONICS: &[Component] = &[F32];
 
-/// The accessors of a primitive, all of as many elements.
+/// The accessors of a primitive. All have the same number of elements.
 #[derive(Debug)]
 pub(super) struct Accessors {
     position: Accessor,
@@ -33,7 +33,7 @@ pub(super) struct Accessors {
 }
 
 impl Accessors {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub(super) fn len(&self) -> usize {
         self.position.count
     }
@@ -41,7 +41,7 @@ impl Accessors {
     /// Checks the accessors of a primitive that is not compressed.
     ///
     /// # Errors
-    /// [`Error::Format`] for numbers that are not all there or of the wrong kind.
+    /// [`Error::Format`] for numbers that are not all in the file or have the wrong type.
     pub(super) fn check(
         name: &str,
         document: &Document<'_>,
@@ -81,7 +81,7 @@ impl Accessors {
         })
     }
 
-    /// Decodes Gaussians `range` to SH of `degree`, which is no lower than that of the primitive.
+    /// Decodes Gaussians `range` to SH of `degree`, which must not be lower than the degree of the primitive.
     pub(super) fn fill(
         &self,
         buffers: &Buffers<'_>,
@@ -112,7 +112,7 @@ impl Accessors {
     }
 }
 
-/// The opacity before the sigmoid of `share`, 0 to 1. It is infinite for 0 and 1, and below and above.
+/// Returns the opacity before the sigmoid of `share`. It is infinite for shares up to 0 and from 1 on.
 #[expect(clippy::cast_possible_truncation, reason = "scenes are in single precision")]
 pub(super) fn logit(share: f32) -> f32 {
     if share <= 0.0 {
@@ -125,7 +125,7 @@ pub(super) fn logit(share: f32) -> f32 {
     }
 }
 
-/// The logarithm of `scale`, and of half the smallest scale above 0 for 0, whose logarithm is not finite.
+/// Returns the logarithm of `scale`. For 0, whose logarithm is not finite, half of the smallest scale above 0 is used.
 #[expect(clippy::cast_possible_truncation, reason = "scenes are in single precision")]
 pub(super) fn log_scale(scale: f32, half_step: f64) -> f32 {
     libm::log(if scale == 0.0 { half_step } else { scale.into() }) as f32

@@ -1,4 +1,4 @@
-//! The parts of glTF's JSON that say where splats are.
+//! The parts of a glTF's JSON that tell where splats are.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use lexisplat::{Error, Limits, Result};
 use serde::{Deserialize, Serialize};
 
-/// Longest text, in bytes, that counts as part of the header. Longer ones are data in base64.
+/// Largest text that counts as part of the header, in bytes. Longer texts are data in base64.
 const LONG_TEXT: usize = 1024;
 
-/// What is read of a glTF. Everything else in it is left out.
+/// The parts of a glTF that are read. All others are ignored.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct Document<'a> {
@@ -42,10 +42,10 @@ pub(super) struct Scene {
 pub(super) struct Node {
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
-    /// Column by column.
+    /// Entries column by column.
     pub(super) matrix: Option<Box<[f64; 16]>>,
     pub(super) translation: Option<[f64; 3]>,
-    /// (x, y, z, w).
+    /// Quaternion (x, y, z, w).
     pub(super) rotation: Option<[f64; 4]>,
     pub(super) scale: Option<[f64; 3]>,
 }
@@ -69,7 +69,7 @@ pub(super) struct Primitive {
 pub(super) struct PrimitiveExtensions {
     #[serde(rename = "KHR_gaussian_splatting")]
     pub(super) splatting: Option<Splatting>,
-    /// The first drafts of compression.
+    /// Compression in the form of the first drafts.
     #[serde(rename = "KHR_spz_gaussian_splats_compression", alias = "KHR_spz_compression")]
     pub(super) draft: Option<Compressed>,
 }
@@ -115,7 +115,7 @@ pub(super) struct AccessorEntry {
     pub(super) sparse: Option<serde::de::IgnoredAny>,
 }
 
-/// How many values an element has.
+/// Number of values of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 pub(super) enum Shape {
     #[serde(rename = "SCALAR")]
@@ -146,7 +146,7 @@ pub(super) struct BufferEntry<'a> {
     pub(super) byte_length: u64,
 }
 
-/// Bytes of `json` outside of texts that are longer than [`LONG_TEXT`].
+/// Returns the number of bytes of `json` outside of texts that are longer than [`LONG_TEXT`].
 fn structure(json: &[u8]) -> u64 {
     let (mut bytes, mut start) = (0, None::<usize>);
     let mut at = 0;
@@ -168,11 +168,12 @@ fn structure(json: &[u8]) -> u64 {
 }
 
 impl<'a> Document<'a> {
-    /// Reads `json` of the file called `name`. What is not read may be nested as deeply as it likes: it is skipped without
-    /// recursion.
+    /// Reads the `json` of the file called `name`. Ignored parts may be nested to any depth, because they are skipped
+    /// without recursion.
     ///
     /// # Errors
-    /// [`Error::Limit`] for more JSON than the limits allow, texts of data aside; [`Error::Format`] for what is no glTF.
+    /// [`Error::Limit`] for more JSON than the limits allow, without the texts of data; [`Error::Format`] for JSON that
+    /// is not a glTF.
     pub(super) fn parse(name: &str, json: &'a [u8], limits: &Limits) -> Result<Self> {
         limits.check_header(name, structure(json))?;
         let document: Self = serde_json::from_slice(json)

@@ -6,11 +6,11 @@ use crate::numbers::u32_at;
 
 /// First bytes of a glb.
 pub(crate) const MAGIC: &[u8] = b"glTF";
-/// The version of the container.
+/// Version of the container.
 pub(super) const VERSION: u32 = 2;
-/// Bytes of the header: first bytes, version, length of all.
+/// Number of bytes of the header: first bytes, version, and length of the file.
 pub(super) const HEADER: usize = 12;
-/// Bytes of a chunk's length and type.
+/// Number of bytes of a chunk's length and type.
 pub(super) const CHUNK_HEADER: usize = 8;
 /// Types of chunks.
 pub(super) const JSON: [u8; 4] = *b"JSON";
@@ -30,10 +30,10 @@ fn truncated(name: &str, what: &str, expected: usize, found: usize) -> Error {
 }
 
 impl<'a> Chunks<'a> {
-    /// The chunks of the glb in `bytes`, which messages call `name`.
+    /// Returns the chunks of the glb in `bytes`, which messages call `name`.
     ///
     /// # Errors
-    /// [`Error::Format`] for another version, lengths that the file does not have, and chunks out of order.
+    /// [`Error::Format`] for another version, for lengths that do not match the file, and for chunks out of order.
     pub(super) fn read(name: &str, bytes: &'a [u8]) -> Result<Self> {
         if bytes.len() < HEADER {
             return Err(truncated(name, "the header of a glb", HEADER, bytes.len()));

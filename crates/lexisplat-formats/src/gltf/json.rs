@@ -1,4 +1,4 @@
-//! The JSON of a glTF as it is written.
+//! The JSON of a glTF in the form in which it is written.
 
 use std::collections::BTreeMap;
 
@@ -126,24 +126,24 @@ struct BufferOut {
     byte_length: usize,
 }
 
-/// An attribute: its name, and what its numbers are.
+/// An attribute: its name and the type of its numbers.
 #[derive(Debug)]
 pub(super) struct Attribute {
     pub(super) name: String,
     pub(super) shape: Shape,
-    /// Shares in bytes, and not floats.
+    /// Whether numbers are normalised bytes instead of floats.
     pub(super) is_byte: bool,
 }
 
 impl Attribute {
-    /// Bytes of an element.
+    /// Returns the number of bytes of an element.
     pub(super) fn width(&self) -> usize {
         self.shape.numbers() * if self.is_byte { 1 } else { size_of::<f32>() }
     }
 }
 
 impl Root {
-    /// Moves the splats by `offset`, which is along a trainer's axes.
+    /// Moves the splats by `offset`, which is along the axes of a trainer's PLY.
     pub(super) fn set_translation(&mut self, offset: Option<Offset>) {
         let signs = GLTF.map(|change| if change { -1.0 } else { 1.0 });
         let along = |offset: Offset| {
@@ -155,8 +155,8 @@ impl Root {
         }
     }
 
-    /// Of `count` splats with `attributes`, the first of which are positions between `bounds`. The attributes lie one after
-    /// another in the buffer; if there is an SPZ of `spz` bytes, the buffer holds that alone.
+    /// Returns the glTF of `count` splats with `attributes`, the first of which are positions within `bounds`. The
+    /// attributes lie one after another in the buffer. If there is an SPZ of `spz` bytes, the buffer holds only the SPZ.
     pub(super) fn new(
         count: usize,
         attributes: &[Attribute],
@@ -202,7 +202,7 @@ impl Root {
         let primitive = PrimitiveOut { attributes: attributes.collect(), mode: POINTS, extensions };
         Self {
             asset: Asset { version: "2.0", generator: "lexisplat" },
-            // Without it the accessors of compressed splats are all zeros.
+            // Without the extension the accessors of compressed splats are all zeros.
             extensions_required: if spz.is_some() { extensions_used.clone() } else { Vec::new() },
             extensions_used,
             scene: 0,

@@ -1,8 +1,9 @@
 //! glTF 2.0 with `KHR_gaussian_splatting`, as a glb or as JSON (KhronosGroup/glTF, `extensions/2.0/Khronos`), and with
-//! `KHR_gaussian_splatting_compression_spz_2`, a draft whose splats are an SPZ.
+//! `KHR_gaussian_splatting_compression_spz_2`, a draft in which the splats are an SPZ.
 //!
-//! Splats are primitives of meshes, which nodes show. Positions, rotations, scales, opacities and every SH coefficient are
-//! accessors of their own. Scales are linear, opacities shares. The axes are x left, y up, z forward.
+//! Splats are primitives of meshes, and nodes show meshes. Positions, rotations, scales, opacities and every SH
+//! coefficient have accessors of their own. Scales are linear, and opacities are shares. The axes are x left, y up, z
+//! forward.
 
 mod accessor;
 mod buffers;
@@ -32,9 +33,9 @@ use crate::rows::Described;
 pub(crate) use self::glb::MAGIC;
 pub(crate) use self::write::write;
 
-/// The extension of splats, which also begins the names of their attributes.
+/// Extension of splats. The names of their attributes begin with it.
 const EXTENSION: &str = "KHR_gaussian_splatting";
-/// The extension of splats that are an SPZ.
+/// Extension of splats in the form of an SPZ.
 const SPZ_EXTENSION: &str = "KHR_gaussian_splatting_compression_spz_2";
 /// Extensions that a file may require.
 const REQUIRED: [&str; 6] = [
@@ -45,16 +46,16 @@ const REQUIRED: [&str; 6] = [
     "KHR_spz_compression",
     "KHR_mesh_quantization",
 ];
-/// Most splat primitives that a scene shows, each time that it shows them.
+/// Largest number of splat primitives of a scene. A primitive counts each time that it is shown.
 const MOST_SHOWN: usize = 1 << 16;
-/// Most warnings about a file.
+/// Largest number of warnings about a file.
 const MOST_WARNINGS: usize = 32;
 
 /// Reads the glb or glTF in `bytes`, which messages call `name`.
 ///
 /// # Errors
-/// [`Error::Format`] for damage, other files that belong to it, and a file without splats; [`Error::Limit`] for a file that
-/// asks for too much.
+/// [`Error::Format`] for damage, for files that need other files, and for files without splats; [`Error::Limit`] for a
+/// file that asks for too much.
 pub(crate) fn read<'a>(name: &str, bytes: &'a [u8], options: &ReadOptions) -> Result<Described<'a>> {
     let chunks = if bytes.starts_with(MAGIC) {
         Chunks::read(name, bytes)?
@@ -82,29 +83,30 @@ pub(crate) fn read<'a>(name: &str, bytes: &'a [u8], options: &ReadOptions) -> Re
     ];
     let (len, degree, antialiased) = (scene.len(), scene.degree(), scene.is_antialiased());
     options.limits.check_gaussians(name, len as u64)?;
-    // Many nodes may show one mesh. The limit of bytes is that of parts, and their reader checks it.
+    // Many nodes may show the same mesh. The limit of bytes applies to parts of a scene, and the reader of parts checks
+    // it.
     let each = size_of::<f32>() * (3 + 3 + 1 + 3 + 4 + degree.rest());
     options.limits.with_bytes(u64::MAX).check_arrays(name, file_bytes, len, each)?;
     let meta = SceneMeta { antialiased, offset: scene.settle_offset(), ..SceneMeta::default() };
     Ok(Described { rows: Box::new(scene), len, degree, meta, warnings, facts })
 }
 
-/// The name of an attribute of splats.
+/// Returns the full name of an attribute of splats.
 fn attribute(name: &str) -> String {
     format!("{EXTENSION}:{name}")
 }
 
-/// The names of the attributes of SH-rest of `degree`, in the order of one channel.
+/// Returns the names of the attributes of SH-rest of `degree`, in the order of one channel.
 fn rest_attributes(degree: ShDegree) -> impl Iterator<Item = String> {
     (1..=degree.get()).flat_map(of_degree)
 }
 
-/// The names of the attributes of SH of degree `l` alone.
+/// Returns the names of the attributes of SH of degree `l` alone.
 fn of_degree(l: u8) -> impl Iterator<Item = String> {
     (0..=2 * l).map(move |n| attribute(&format!("SH_DEGREE_{l}_COEF_{n}")))
 }
 
-/// Adds a warning that is not there yet, up to [`MOST_WARNINGS`].
+/// Adds a warning if it is new, up to [`MOST_WARNINGS`] warnings.
 fn warn(warnings: &mut Vec<String>, text: String) {
     if warnings.len() < MOST_WARNINGS && !warnings.contains(&text) {
         warnings.push(text);

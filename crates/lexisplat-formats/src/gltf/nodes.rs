@@ -1,4 +1,4 @@
-//! The tree of nodes, and where each of them puts its mesh.
+//! The tree of nodes, and the places of their meshes.
 
 use lexisplat::{Error, Result};
 
@@ -8,12 +8,12 @@ use super::document::{Document, Node};
 /// An affine map: the columns of its linear part, and its translation.
 pub(super) type Matrix = [[f64; 3]; 4];
 
-/// Changes nothing.
+/// The map that changes nothing.
 const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]];
-/// How far from 0, 0, 0 and 1 the last row of a matrix may be.
+/// Largest difference of the last row of a matrix from (0, 0, 0, 1), in each entry.
 const LAST_ROW: f64 = 1e-6;
 
-/// A mesh where a node shows it.
+/// A mesh at the place where a node shows it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Shown {
     pub(super) node: usize,
@@ -21,15 +21,15 @@ pub(super) struct Shown {
     pub(super) matrix: Matrix,
 }
 
-/// All meshes that the scene shows: the default scene, else the first, else all nodes.
+/// Returns all meshes of the default scene, or else of the first scene, or else of all nodes.
 ///
 /// # Errors
-/// [`Error::Format`] for nodes that do not exist, that are reached twice, or whose transformation is no affine map.
+/// [`Error::Format`] for nodes that do not exist or are reached twice, and for transformations that are not affine.
 pub(super) fn shown(name: &str, document: &Document<'_>) -> Result<Vec<Shown>> {
     let nodes = &document.nodes;
     let mut reached = vec![false; nodes.len()];
     let mut shown = Vec::new();
-    // A stack and no recursion: nodes may be nested as deeply as there are nodes.
+    // A stack replaces recursion, because nodes may be nested as deeply as there are nodes.
     let mut left: Vec<_> = roots(name, document)?.into_iter().rev().map(|root| (root, IDENTITY)).collect();
     while let Some((index, parent)) = left.pop() {
         let (Some(node), Some(is_reached)) = (nodes.get(index), reached.get_mut(index)) else {
@@ -43,7 +43,7 @@ pub(super) fn shown(name: &str, document: &Document<'_>) -> Result<Vec<Shown>> {
             return Err(Error::malformed(name, format!("the transformation of node {index} is not finite")));
         }
         shown.extend(node.mesh.map(|mesh| Shown { node: index, mesh, matrix }));
-        // A child that is named more often than there are nodes is reached twice.
+        // A list of more children than there are nodes has a child that is reached twice.
         left.extend(node.children.iter().rev().take(nodes.len() + 1).map(|&child| (child, matrix)));
         if left.len() > 2 * nodes.len() {
             return Err(Error::malformed(name, format!("children of node {index} are reached twice")));
@@ -52,7 +52,7 @@ pub(super) fn shown(name: &str, document: &Document<'_>) -> Result<Vec<Shown>> {
     Ok(shown)
 }
 
-/// The nodes that the tree begins with.
+/// Returns the root nodes.
 fn roots(name: &str, document: &Document<'_>) -> Result<Vec<usize>> {
     if let Some(scene) = document.scenes.get(document.scene.unwrap_or(0)) {
         return Ok(scene.nodes.clone());
@@ -69,7 +69,7 @@ fn roots(name: &str, document: &Document<'_>) -> Result<Vec<usize>> {
     Ok((0..is_child.len()).filter(|&k| !is_child[k]).collect())
 }
 
-/// The map of a node by itself.
+/// Returns the map of a node relative to its parent.
 fn local(name: &str, index: usize, node: &Node) -> Result<Matrix> {
     if let Some(matrix) = &node.matrix {
         let (columns, _) = matrix.as_chunks::<4>();
@@ -101,7 +101,7 @@ fn local(name: &str, index: usize, node: &Node) -> Result<Matrix> {
     Ok(matrix)
 }
 
-/// The map `b` and then `a`.
+/// Returns the map `b` followed by the map `a`.
 fn product(a: &Matrix, b: &Matrix) -> Matrix {
     let mut all = b.map(|column| [0, 1, 2].map(|row| (0..3).map(|k| a[k][row] * column[k]).sum()));
     all[3] = [0, 1, 2].map(|row| all[3][row] + a[3][row]);

@@ -1,4 +1,4 @@
-//! Where a primitive's splats are along the axes of a trainer's PLY.
+//! The place of a primitive's splats along the axes of a trainer's PLY.
 
 use lexisplat::{Error, Offset, Result, ShDegree};
 
@@ -8,18 +8,18 @@ use crate::edit::{product, turned};
 use crate::rows::RowsMut;
 use crate::turn_sh::ShRotation;
 
-/// The axes of glTF: x left, y up, z forward. Half a turn about z leads from those of a trainer's PLY to them.
+/// The axes of glTF: x left, y up, z forward. Half a turn about z leads to them from the axes of a trainer's PLY.
 pub(super) const GLTF: [bool; 3] = [true, true, false];
-/// How much the lengths of columns may differ, as a share, and the cosines of their angles from 0.
+/// Largest relative difference of the lengths of columns, and largest absolute cosine of their angles.
 const SLACK: f64 = 1e-4;
-/// How far entries of a rotation may be from 0, 1 and -1 to be taken as them.
+/// Largest difference of entries of a rotation from 0, 1 and -1 at which they are rounded to these values.
 const SIGN_SLACK: f64 = 1e-9;
 
-/// Changes, in the order of the fields, that put splats along a trainer's axes.
+/// Changes that put splats along the axes of a trainer's PLY. They are made in the order of the fields.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     flip: Flip,
-    /// A quaternion (w, x, y, z) of length 1.
+    /// Quaternion (w, x, y, z) of length 1.
     turn: Option<[f64; 4]>,
     scale: f64,
     translation: [f64; 3],
@@ -27,15 +27,15 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// That of splats of node `node`, which `matrix` puts into the scene. The axes that `changes` names have other signs
-    /// than those of the glTF.
+    /// Returns the place of the splats of node `node`, which `matrix` puts into the scene. The axes in `changes` have
+    /// signs that differ from those of the glTF.
     ///
     /// # Errors
     /// [`Error::Format`] for a matrix that scales the axes differently or shears.
     pub(super) fn of(name: &str, node: usize, matrix: &Matrix, changes: [bool; 3]) -> Result<Self> {
         let sign = |change: bool| if change { -1.0 } else { 1.0 };
         let to = GLTF.map(sign);
-        // Signs on the left of the matrix are those of rows, on the right those of columns.
+        // Factors to the left of the matrix apply to rows, and factors to the right of it to columns.
         let [x, y, z, translation] = matrix.map(|column| [0, 1, 2].map(|k| to[k] * column[k]));
         let mut columns = [x, y, z];
         for (column, change) in columns.iter_mut().zip(changes) {
@@ -65,18 +65,18 @@ impl Place {
             let flip = Flip::of([0, 1, 2].map(|k| columns[k][k] < 0.0));
             return Ok(Self { flip, turn: None, scale, translation, is_mirrored });
         }
-        // A mirrored rotation is a rotation of what is mirrored along x.
+        // A mirrored rotation is a mirroring along x followed by a rotation.
         let x = if is_mirrored { x.map(|v| -v) } else { x };
         let flip = Flip::of([is_mirrored, false, false]);
         Ok(Self { flip, turn: Some(quaternion([x, y, z])), scale, translation, is_mirrored })
     }
 
-    /// Where the origin of the splats is.
+    /// Returns the place of the origin of the splats.
     pub(super) fn translation(&self) -> [f64; 3] {
         self.translation
     }
 
-    /// Puts the splats where they are relative to `offset`.
+    /// Makes the place relative to `offset`.
     pub(super) fn rebase(&mut self, offset: Offset) {
         let numbers = offset.get();
         self.translation = [0, 1, 2].map(|k| self.translation[k] - numbers[k]);
@@ -120,9 +120,10 @@ impl Place {
     }
 }
 
-/// The quaternion (w, x, y, z) of the rotation with these columns.
+/// Returns the quaternion (w, x, y, z) of the rotation with these columns.
 fn quaternion([x, y, z]: [[f64; 3]; 3]) -> [f64; 4] {
-    // Four times each component times the largest one, which is that of the largest square.
+    // Each candidate has four times the products of all components with one of them. The component with the largest
+    // square is used.
     let squares = [
         1.0 + x[0] + y[1] + z[2],
         1.0 + x[0] - y[1] - z[2],

@@ -1,4 +1,4 @@
-//! Primitives that are splats, and what they say of themselves.
+//! Primitives that are splats, and their statements about themselves.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -12,39 +12,40 @@ use super::nodes::Shown;
 use super::place::{GLTF, Place};
 use super::{MOST_SHOWN, attribute, of_degree, rest_attributes, warn};
 
-/// `mode` of points.
+/// Value of `mode` for points.
 const POINTS: u32 = 0;
-/// `mode` of a primitive that says none: triangles.
+/// Value of `mode` of a primitive without `mode`: triangles.
 const DEFAULT_MODE: u32 = 4;
-/// Most characters of a word of the file in a message.
+/// Largest number of characters of a word of the file in a message.
 const SHOWN: usize = 64;
-/// Attributes of the drafts of 2024 and 2025. They held no SH, and their colours were those of points.
+/// Attributes of the drafts of 2024 and 2025. The drafts had no SH, and their colours were those of points.
 const DRAFT_ATTRIBUTES: [&str; 3] = ["_SCALE", "_ROTATION", "_OPACITY"];
-/// The highest SH degree of the extension.
+/// Highest SH degree of the extension.
 const EXTENSION_DEGREE: u8 = 3;
-/// The axes of an SPZ's bytes beside a trainer's. Half a turn about x leads to them.
+/// The axes in the bytes of an SPZ relative to those of a trainer's PLY. Half a turn about x leads to them.
 const SPZ: [bool; 3] = [false, true, true];
 
-/// Where the numbers of splats are.
+/// The place of the values of splats.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Source {
-    /// Numbers of accessors: position, rotation, scale, opacity, SH coefficient 0, and SH-rest in the order of one channel.
+    /// Indices of the accessors of position, rotation, scale, opacity and SH coefficient 0, and those of SH-rest in the
+    /// order of one channel.
     Plain { geometry: [usize; 5], rest: Vec<usize>, degree: ShDegree },
-    /// The SPZ in a bufferView, and the number of its Gaussians by the accessor of positions.
+    /// An SPZ in a bufferView, and its number of Gaussians according to the accessor of positions.
     Spz { view: usize, count: Option<u64> },
 }
 
 /// A splat primitive that a node shows.
 #[derive(Debug)]
 pub(super) struct Found {
-    /// What messages call it.
+    /// Name of the primitive in messages.
     pub(super) label: String,
     pub(super) source: Source,
     pub(super) place: Place,
 }
 
 impl Found {
-    /// The bufferViews that it needs.
+    /// Returns the bufferViews that the primitive needs.
     pub(super) fn views(&self, document: &Document<'_>) -> Vec<usize> {
         let view = |accessor: &usize| document.accessors.get(*accessor)?.buffer_view;
         match &self.source {
@@ -54,15 +55,16 @@ impl Found {
     }
 }
 
-/// Short, and without control characters.
+/// Returns `word` shortened and without control characters.
 fn shown(word: &str) -> String {
     word.chars().take(SHOWN).collect::<String>().escape_debug().to_string()
 }
 
-/// All splat primitives that `nodes` show.
+/// Returns all splat primitives that `nodes` show.
 ///
 /// # Errors
-/// [`Error::Format`] for a file without them, and for those that cannot be read; [`Error::Limit`] for too many.
+/// [`Error::Format`] for a file without splat primitives, and for primitives that cannot be read; [`Error::Limit`] for
+/// too many primitives.
 pub(super) fn find(
     name: &str,
     document: &Document<'_>,
@@ -70,7 +72,7 @@ pub(super) fn find(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Found>> {
     let (mut found, mut others, mut mirrored) = (Vec::new(), 0, 0_usize);
-    // Many nodes may show one mesh.
+    // Many nodes may show the same mesh.
     let mut meshes = BTreeMap::new();
     for node in nodes {
         let sources = match meshes.entry(node.mesh) {
@@ -107,13 +109,14 @@ pub(super) fn find(
 
 /// The primitives of a mesh.
 struct Sources {
-    /// What messages call them, where their splats are, and the axes whose signs they have beside those of the glTF.
+    /// For each splat primitive: its name in messages, the place of its values, and the axes whose signs differ from
+    /// those of the glTF.
     splats: Vec<(String, Source, [bool; 3])>,
-    /// Number of those that are not splats.
+    /// Number of primitives that are not splats.
     others: u64,
 }
 
-/// The primitives of mesh `index`.
+/// Returns the primitives of mesh `index`.
 fn sources(name: &str, document: &Document<'_>, index: usize, warnings: &mut Vec<String>) -> Result<Sources> {
     let mesh = document.meshes.get(index).ok_or_else(|| missing(name, "mesh", index))?;
     let mut sources = Sources { splats: Vec::new(), others: 0 };
@@ -127,8 +130,8 @@ fn sources(name: &str, document: &Document<'_>, index: usize, warnings: &mut Vec
     Ok(sources)
 }
 
-/// Where the splats of `primitive` are, and the axes whose signs they have beside those of the glTF; none if it is not of
-/// splats.
+/// Returns the place of the values of `primitive`, and the axes whose signs differ from those of the glTF. Returns `None`
+/// if the primitive is not of splats.
 fn source(
     name: &str,
     document: &Document<'_>,
@@ -155,17 +158,18 @@ fn source(
     };
     let position = primitive.attributes.get("POSITION").and_then(|&k| document.accessors.get(k));
     let source = Source::Spz { view: spz.buffer_view, count: position.map(|accessor| accessor.count) };
-    // Reading an SPZ turns it to a trainer's axes. The drafts' files hold glTF's own axes where SPZ has its own.
+    // Reading an SPZ turns it to the axes of a trainer's PLY. Files of the drafts have glTF's axes where SPZ has its own
+    // axes.
     let is_draft = nested.is_none() || splatting.is_none_or(is_draft);
     Ok(Some((source, if is_draft { SPZ } else { GLTF })))
 }
 
-/// Whether the words are missing that the extension asks for and that its drafts did not have.
+/// Returns whether the words are missing that the extension requires and that its drafts did not have.
 fn is_draft(splatting: &Splatting) -> bool {
     splatting.kernel.is_none() && splatting.color_space.is_none()
 }
 
-/// Refuses unknown kernels, and warns of what is drawn otherwise than a trainer's PLY.
+/// Returns an error for unknown kernels. Adds warnings about properties that are drawn differently from a trainer's PLY.
 fn check_words(name: &str, label: &str, splatting: &Splatting, warnings: &mut Vec<String>) -> Result<()> {
     if let Some(kernel) = splatting.kernel.as_deref().filter(|kernel| *kernel != "ellipse") {
         let text = format!("{label}: the kernel '{}' is not read, only 'ellipse'", shown(kernel));
@@ -192,7 +196,7 @@ fn check_words(name: &str, label: &str, splatting: &Splatting, warnings: &mut Ve
     Ok(())
 }
 
-/// The accessors of a primitive that is not compressed.
+/// Returns the accessors of a primitive that is not compressed.
 fn plain(name: &str, label: &str, primitive: &Primitive, warnings: &mut Vec<String>) -> Result<Source> {
     let attributes = &primitive.attributes;
     let accessor = |attribute: &str| {

@@ -17,12 +17,12 @@ use super::warn;
 use crate::rows::{Rows, RowsMut};
 use crate::spz;
 
-/// Gaussians whose sizes say whether single precision is too coarse for a translation.
+/// Number of Gaussians whose sizes tell whether single precision is too coarse for a translation.
 const SAMPLE: usize = 4096;
-/// Half the distance of neighbouring values in single precision is at most this share of them.
+/// Half of the relative distance of neighbouring values in single precision, at most.
 const HALF_STEP: f64 = 1.0 / (1_u64 << 24) as f64;
 
-/// An SPZ of a bufferView.
+/// An SPZ in a bufferView.
 #[derive(Clone)]
 struct Packed {
     rows: Arc<dyn Rows>,
@@ -36,9 +36,9 @@ enum Splats {
     Packed(Packed),
 }
 
-/// The splats of a primitive in their place.
+/// The splats of a primitive with their place.
 struct Part {
-    /// Number of the part's first Gaussian, and of the first after it.
+    /// Number of the part's first Gaussian, and of the first Gaussian after the part.
     range: Range<usize>,
     splats: Splats,
     place: Place,
@@ -48,7 +48,7 @@ struct Part {
 pub(super) struct Scene<'a> {
     buffers: Buffers<'a>,
     parts: Vec<Part>,
-    /// The highest SH degree.
+    /// Highest SH degree of all parts.
     degree: ShDegree,
 }
 
@@ -63,23 +63,23 @@ impl<'a> Scene<'a> {
         Self { buffers, parts: Vec::new(), degree: ShDegree::ZERO }
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub(super) fn len(&self) -> usize {
         self.parts.last().map_or(0, |part| part.range.end)
     }
 
-    /// The highest SH degree.
+    /// Returns the highest SH degree of all parts.
     pub(super) fn degree(&self) -> ShDegree {
         self.degree
     }
 
-    /// Whether all parts have the mark of anti-aliasing, which only an SPZ has.
+    /// Returns whether all parts have the mark of anti-aliasing, which only an SPZ can have.
     pub(super) fn is_antialiased(&self) -> bool {
         self.parts.iter().all(|part| matches!(&part.splats, Splats::Packed(packed) if packed.antialiased))
     }
 
-    /// Takes the translation of the first part off all of them and returns it, if single precision is too coarse so far
-    /// from the origin for the sizes of the first Gaussians.
+    /// Subtracts the translation of the first part from all parts and returns it, if single precision is too coarse at
+    /// this distance from the origin for the sizes of the first Gaussians.
     pub(super) fn settle_offset(&mut self) -> Option<Offset> {
         let translation = self.parts.first()?.place.translation();
         let offset = Offset::new(translation).ok()??;
@@ -109,7 +109,8 @@ impl<'a> Scene<'a> {
     /// Adds the splats of all of `found`.
     ///
     /// # Errors
-    /// [`Error::Format`] for numbers that are not all there or of the wrong kind, [`Error::Limit`] for too many Gaussians.
+    /// [`Error::Format`] for numbers that are not all in the file or have the wrong type, [`Error::Limit`] for too many
+    /// Gaussians.
     pub(super) fn add_all(
         &mut self,
         name: &str,
@@ -119,7 +120,7 @@ impl<'a> Scene<'a> {
         options: &ReadOptions,
         warnings: &mut Vec<String>,
     ) -> Result<()> {
-        // Nodes that show the same SPZ share it.
+        // Nodes that show the same SPZ share its decoded form.
         let mut packed = BTreeMap::<usize, Packed>::new();
         let mut packed_bytes = 0;
         for found in found {
@@ -163,7 +164,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// The SPZ in `bytes`, which `found` has.
+/// Reads the SPZ in `bytes`, which belongs to `found`.
 fn unpack(
     name: &str,
     found: &Found,
@@ -203,7 +204,7 @@ impl Rows for Scene<'_> {
 }
 
 impl Packed {
-    /// Decodes Gaussians `range` to SH of `degree`, which is no lower than that of the SPZ.
+    /// Decodes Gaussians `range` to SH of `degree`, which must not be lower than the degree of the SPZ.
     fn fill(&self, range: Range<usize>, degree: ShDegree, out: RowsMut<'_>) {
         if self.degree == degree {
             return self.rows.fill(range, out);

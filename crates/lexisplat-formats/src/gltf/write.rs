@@ -18,24 +18,25 @@ use crate::settle::settled;
 use crate::spz;
 use crate::write::{Lost, WriteOptions};
 
-/// The highest SH degree of the extension.
+/// Highest SH degree of the extension.
 const MOST_DEGREE: u8 = 3;
-/// The version of SPZ that the extension of compression has.
+/// Version of SPZ in the extension of compression.
 const SPZ_VERSION: u8 = 2;
-/// Chunks and accessors begin at multiples of so many bytes.
+/// Alignment of chunks and accessors, in bytes.
 const ALIGNMENT: usize = 4;
-/// Gaussians that are looked at together.
+/// Number of Gaussians that are processed together.
 const PART: usize = 8192;
-/// How far the length of a quaternion may be from 1, so that it stays as it is.
+/// Largest difference from 1 of the length of a quaternion that is written as it is.
 const UNIT_SLACK: f64 = 1e-6;
-/// Decoding of sRGB to linear values (IEC 61966-2-1): below the first number a division by the second, above it a power.
+/// Constants of the decoding of sRGB to linear values (IEC 61966-2-1). Values up to the first number are divided by the
+/// second. Larger values are `((v + 0.055) / 1.055)^2.4`.
 const SRGB: [f32; 5] = [0.040_45, 12.92, 0.055, 1.055, 2.4];
 
-/// Writes `splats` as a glb, with floats, or with an SPZ if the options say so.
+/// Writes `splats` as a glb, with floats, or with an SPZ if the options ask for it.
 ///
 /// # Errors
-/// [`Error::Parameter`] for no splats, which a glTF cannot hold, and for options of SPZ out of range; [`Error::Limit`] for
-/// more bytes than a glb can have.
+/// [`Error::Parameter`] for no splats, because a glTF cannot be empty, and for SPZ options out of range; [`Error::Limit`]
+/// for more bytes than a glb can have.
 pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>, Lost)> {
     if splats.is_empty() {
         return Err(Error::parameter("scene", "no Gaussians", "one or more: glTF has no empty accessors"));
@@ -63,7 +64,7 @@ pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>,
     Ok((glb(&root, &bin)?, lost))
 }
 
-/// The attributes of splats of `degree`, in the order of the file.
+/// Returns the attributes of splats of `degree`, in the order of the file.
 fn attributes(degree: ShDegree) -> Vec<Attribute> {
     let of = |name: String, shape| Attribute { name, shape, is_byte: false };
     let mut all = vec![
@@ -78,7 +79,8 @@ fn attributes(degree: ShDegree) -> Vec<Attribute> {
     all
 }
 
-/// The bytes of all attributes, `width` of each Gaussian. Adds how many values were out of range.
+/// Returns the bytes of all attributes, `width` bytes for each Gaussian. Adds the number of values that are out of range
+/// to `limited`.
 fn columns(splats: &Splats, width: usize, limited: &mut u64) -> Vec<u8> {
     fn put(bin: &mut Vec<u8>, values: &[f32]) {
         values.iter().for_each(|v| bin.extend(v.to_le_bytes()));
@@ -113,7 +115,7 @@ fn columns(splats: &Splats, width: usize, limited: &mut u64) -> Vec<u8> {
     bin
 }
 
-/// The standard deviation that its logarithm `scale` means, and whether it had to be limited to what a float holds.
+/// Returns the standard deviation for its logarithm `scale`, and whether it was limited to the range of `f32`.
 #[expect(clippy::cast_possible_truncation, reason = "the file has single precision")]
 fn spread(scale: f32) -> (f32, bool) {
     let exp = |scale: f32| (libm::exp(f64::from(scale)) as f32).min(f32::MAX);
@@ -121,10 +123,10 @@ fn spread(scale: f32) -> (f32, bool) {
     (f32::from_bits(settled(exp(scale).to_bits(), again)), libm::exp(f64::from(scale)) > f64::from(f32::MAX))
 }
 
-/// The share of 0 to 1 that `opacity`, which is before the sigmoid, means.
+/// Returns the opacity as a share, 0 to 1, for `opacity` before the sigmoid.
 #[expect(clippy::cast_possible_truncation, reason = "the file has single precision")]
 pub(super) fn share(opacity: f32) -> f32 {
-    // This value stands for infinity, and its negative for that of 0.
+    // `SURE_OPACITY` stands for infinity, and its negative for minus infinity.
     if opacity <= -SURE_OPACITY {
         return 0.0;
     }
@@ -132,7 +134,7 @@ pub(super) fn share(opacity: f32) -> f32 {
     f32::from_bits(settled(sigmoid(opacity).to_bits(), |bits| sigmoid(logit(f32::from_bits(bits))).to_bits()))
 }
 
-/// `q` with a length of 1.
+/// Returns `q` scaled to length 1.
 #[expect(clippy::cast_possible_truncation, reason = "the file has single precision")]
 pub(super) fn unit(q: [f32; 4]) -> [f32; 4] {
     let length = q.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
@@ -145,13 +147,13 @@ pub(super) fn unit(q: [f32; 4]) -> [f32; 4] {
     }
 }
 
-/// The linear value of `v`, of sRGB.
+/// Returns the linear value of the sRGB value `v`.
 fn linear(v: f32) -> f32 {
     let [least, factor, offset, size, power] = SRGB;
     if v <= least { v / factor } else { libm::powf((v + offset) / size, power) }
 }
 
-/// The lowest and highest values of each axis of `positions`, which have a trainer's axes.
+/// Returns the lowest and the highest value of `positions` along each axis of a trainer's PLY.
 fn bounds(mut positions: impl Iterator<Item = [f32; 3]>) -> [[f32; 3]; 2] {
     let first = positions.next().unwrap_or_default();
     positions.fold([first; 2], |[low, high], p| {
@@ -159,13 +161,13 @@ fn bounds(mut positions: impl Iterator<Item = [f32; 3]>) -> [[f32; 3]; 2] {
     })
 }
 
-/// The same bounds along the axes of a glTF.
+/// Returns the bounds along the axes of a glTF.
 fn flipped([low, high]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
     let [a, b] = [low, high].map(|corner| Flip::of(GLTF).position(corner));
     [[0, 1, 2].map(|k| a[k].min(b[k])), [0, 1, 2].map(|k| a[k].max(b[k]))]
 }
 
-/// The bounds of the positions in the SPZ `bytes`, which this program wrote, along a trainer's axes.
+/// Returns the bounds of the positions in the SPZ `bytes`, which this program wrote, along the axes of a trainer's PLY.
 fn spz_bounds(bytes: &[u8]) -> Result<[[f32; 3]; 2]> {
     let options = ReadOptions::default().with_limits(Limits::default().with_expansion(u64::MAX));
     let described = spz::read("the SPZ of the glb", bytes, &options)?;
@@ -190,13 +192,13 @@ fn spz_bounds(bytes: &[u8]) -> Result<[[f32; 3]; 2]> {
     Ok(bounds(found.into_iter()))
 }
 
-/// Refuses a glb of more than `bytes` bytes if its header cannot say so.
+/// Returns the length of a glb of `bytes` bytes, or an error if the header has no room for it.
 fn check_length(bytes: u64) -> Result<u32> {
     let what = "bytes of a glb, whose lengths have 32 bits; write another format".to_owned();
     u32::try_from(bytes).map_err(|_| Error::Limit { what, found: bytes, limit: u32::MAX.into(), name: None })
 }
 
-/// The glb of `root` and its buffer.
+/// Returns the glb of `root` and its buffer.
 fn glb(root: &Root, bin: &[u8]) -> Result<Vec<u8>> {
     let mut json = serde_json::to_vec(root)
         .map_err(|error| Error::parameter("scene", error, "values that JSON can hold"))?;

@@ -1,22 +1,23 @@
-//! Where everything of a .ksplat is. After this every row and every centre that is asked for is within the file.
+//! The layout of a .ksplat. It is checked when the headers are read, so that every row and every centre is within the
+//! file.
 
 use lexisplat::{Error, FormatError, Result, ShDegree};
 
-/// Bytes of the file's header (`SplatBuffer.HeaderSizeBytes`).
+/// Number of bytes of the file's header (`SplatBuffer.HeaderSizeBytes`).
 pub(super) const HEADER: usize = 4096;
-/// Bytes of a section's header (`SplatBuffer.SectionHeaderSizeBytes`).
+/// Number of bytes of a section's header (`SplatBuffer.SectionHeaderSizeBytes`).
 pub(super) const SECTION_HEADER: usize = 1024;
-/// Bytes of a bucket's centre, three f32 (`SplatBuffer.BucketStorageSizeBytes`).
+/// Number of bytes of a bucket's centre, three f32 (`SplatBuffer.BucketStorageSizeBytes`).
 pub(super) const CENTRE: usize = 12;
-/// Half of the steps of a position within its bucket, where a section says 0
+/// Half of the number of steps of a position within its bucket, if a section states 0
 /// (`SplatBuffer.CompressionLevels[1].ScaleRange`).
 const DEFAULT_RANGE: u32 = 32_767;
-/// Largest absolute SH value of a byte where the header says 0 (`DefaultSphericalHarmonics8BitCompressionHalfRange`).
+/// Largest absolute SH value of a byte, if the header states 0 (`DefaultSphericalHarmonics8BitCompressionHalfRange`).
 const DEFAULT_SH: f32 = 1.5;
-/// Highest SH degree that a row has room for.
+/// Highest SH degree that fits in a row.
 const MAX_DEGREE: u16 = 3;
 
-/// How values are held.
+/// Compression level: the types of values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
     /// Level 0: f32.
@@ -40,7 +41,7 @@ impl Level {
         self == Self::Whole
     }
 
-    /// Byte of a row at which its scales begin; the position comes before.
+    /// Returns the byte of a row at which its scales begin. The position is before them.
     pub(super) fn scales(self) -> usize {
         if self.is_whole() { 12 } else { 6 }
     }
@@ -49,7 +50,7 @@ impl Level {
         2 * self.scales()
     }
 
-    /// Byte of a row at which its colour and opacity begin.
+    /// Returns the byte of a row at which its colour and opacity begin.
     pub(super) fn colour(self) -> usize {
         self.rotation() + if self.is_whole() { 16 } else { 8 }
     }
@@ -71,10 +72,10 @@ impl Level {
     }
 }
 
-/// A section with Gaussians.
+/// A section of the file, which has Gaussians.
 #[derive(Debug)]
 pub(super) struct Section<'a> {
-    /// Number of its first Gaussian in the scene.
+    /// Number of the section's first Gaussian in the scene.
     pub(super) first: usize,
     len: usize,
     pub(super) degree: ShDegree,
@@ -82,13 +83,13 @@ pub(super) struct Section<'a> {
     rows: &'a [u8],
     /// Side of a bucket, in world units.
     pub(super) block: f32,
-    /// Half of the steps of a position.
+    /// Half of the number of steps of a position.
     pub(super) range: u32,
     centres: &'a [[u8; CENTRE]],
-    /// Gaussians of a full bucket, and how many buckets are full. They come first.
+    /// Number of Gaussians of a full bucket, and number of full buckets. Full buckets come first.
     capacity: usize,
     full: usize,
-    /// After which Gaussian each other bucket ends.
+    /// For each bucket that is not full: the number of the Gaussian after its last one.
     ends: Vec<usize>,
 }
 
@@ -97,12 +98,12 @@ impl Section<'_> {
         self.first + self.len
     }
 
-    /// The bytes of Gaussian `i` of the section.
+    /// Returns the bytes of Gaussian `i` of the section.
     pub(super) fn row(&self, i: usize) -> &[u8] {
         &self.rows[i * self.row_bytes..(i + 1) * self.row_bytes]
     }
 
-    /// The centre of the bucket of Gaussian `i` of the section.
+    /// Returns the centre of the bucket of Gaussian `i` of the section.
     pub(super) fn centre(&self, i: usize) -> [f32; 3] {
         let bucket = if i < self.full.saturating_mul(self.capacity) {
             i / self.capacity
@@ -114,13 +115,13 @@ impl Section<'_> {
     }
 }
 
-/// What the headers say.
+/// The contents of the headers.
 #[derive(Debug)]
 pub(super) struct Layout<'a> {
     pub(super) version: String,
     pub(super) level: Level,
     pub(super) gaussians: usize,
-    /// The highest of the sections.
+    /// Highest SH degree of the sections.
     pub(super) degree: ShDegree,
     /// SH values of bytes 0 and 255.
     pub(super) sh_range: [f32; 2],
@@ -164,7 +165,7 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// Reads section `s`, whose data `rest` begins with. `first` is the number of its first Gaussian.
+/// Reads section `s`. Its data are at the start of `rest`. `first` is the number of its first Gaussian.
 fn section<'a>(
     name: &str,
     s: usize,
@@ -234,7 +235,7 @@ fn section<'a>(
     Ok(section)
 }
 
-/// Cuts `len` bytes off `rest`, the end of the file `bytes`.
+/// Cuts `len` bytes off the start of `rest`, which is the end of the file `bytes`.
 fn take<'a>(name: &str, what: &str, bytes: &[u8], rest: &mut &'a [u8], len: usize) -> Result<&'a [u8]> {
     let Some((taken, after)) = rest.split_at_checked(len) else {
         let start = (bytes.len() - rest.len()) as u64;
@@ -253,7 +254,7 @@ fn u32_at(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
-/// Saturates where a number of the file does not fit into memory anyway.
+/// Converts a number. It saturates if a number of the file does not fit into memory anyway.
 fn size(number: u32) -> usize {
     usize::try_from(number).unwrap_or(usize::MAX)
 }

@@ -1,8 +1,8 @@
 //! `.ksplat`: the format of mkkellogg's `GaussianSplats3D` (`src/loaders/SplatBuffer.js`), compression levels 0 to 2.
 //!
-//! A file is a header, headers of sections, and the data of the sections one after another: sizes of buckets that are not
-//! full, centres of buckets, and rows. At levels 1 and 2 positions are 16 bits about the centre of their bucket. The axes are
-//! those of a PLY. [`layout`] checks everything that steers reading.
+//! A file has a header, the headers of sections, and the data of the sections one after another: the sizes of buckets
+//! that are not full, the centres of buckets, and rows. At levels 1 and 2 positions have 16 bits and are relative to the
+//! centre of their bucket. The axes are those of a PLY. [`layout`] checks all values that control reading.
 
 mod layout;
 
@@ -18,13 +18,13 @@ use self::layout::{Layout, Level, Section};
 use crate::opacity::{MOST, logits};
 use crate::rows::{Described, Rows, RowsMut};
 
-/// Natural logarithm of 2^-25, half of the smallest value of f16 above 0: stands for a scale of 0, whose logarithm is not
-/// finite.
+/// Logarithm of a scale that stands for a scale of 0, whose logarithm is not finite: the natural logarithm of 2^-25, half
+/// of the smallest f16 above 0.
 const LEAST_SCALE: f32 = -17.328_68;
-/// SH coefficients of a colour channel in each degree from 1 on.
+/// Number of SH coefficients of a colour channel in each degree, from degree 1 on.
 const IN_DEGREE: [usize; 3] = [3, 5, 7];
 
-/// Whether `bytes` are a .ksplat: nothing marks the format but that all of its headers fit.
+/// Returns whether `bytes` are a .ksplat. The format has no mark, so the test is whether all headers are consistent.
 pub(crate) fn is_likely(bytes: &[u8]) -> bool {
     Layout::of("", bytes).is_ok()
 }
@@ -87,7 +87,7 @@ fn log_scale(scale: f32) -> f32 {
     if scale == 0.0 { LEAST_SCALE } else { libm::logf(scale) }
 }
 
-/// The bytes of a Gaussian.
+/// Reads the values of a Gaussian from the bytes of its row.
 #[derive(Clone, Copy)]
 struct RowReader<'r> {
     level: Level,
@@ -95,7 +95,7 @@ struct RowReader<'r> {
 }
 
 impl RowReader<'_> {
-    /// `N` values from byte `at`, 32 bits each at level 0 and 16 bits above.
+    /// Returns `N` values from byte `at` on, of 32 bits each at level 0 and of 16 bits at higher levels.
     fn numbers<const N: usize>(self, at: usize) -> [f32; N] {
         match self.level {
             Level::Whole => std::array::from_fn(|k| f32_at(self.row, at + k * size_of::<f32>())),
@@ -105,7 +105,7 @@ impl RowReader<'_> {
         }
     }
 
-    /// SH value `k` of the row. `range` is that of bytes.
+    /// Returns SH value `k` of the row. `range` has the values of the bytes 0 and 255.
     fn sh(self, k: usize, range: [f32; 2]) -> f32 {
         let at = self.level.harmonics();
         match self.level {
@@ -121,7 +121,7 @@ impl RowReader<'_> {
     }
 }
 
-/// The position of Gaussian `i` of a section.
+/// Returns the position of Gaussian `i` of a section.
 #[expect(clippy::cast_possible_truncation, reason = "f32 is what the file promises")]
 fn position(section: &Section<'_>, i: usize, reader: RowReader<'_>) -> [f32; 3] {
     if reader.level == Level::Whole {
@@ -135,8 +135,8 @@ fn position(section: &Section<'_>, i: usize, reader: RowReader<'_>) -> [f32; 3] 
     })
 }
 
-/// SH of a row of `degree` to `out`, which holds those of the degree of the scene: each degree of a row is channel-major by
-/// itself.
+/// Writes the SH of a row of `degree` to `out`, which has the degree of the scene. In a row each degree is channel-major
+/// by itself.
 fn sh(layout: &Layout<'_>, degree: ShDegree, reader: RowReader<'_>, out: &mut [f32]) {
     out.fill(0.0);
     let channel = out.len() / 3;

@@ -1,6 +1,7 @@
 //! The files of a SOG: members of a zip archive, or files beside `meta.json`.
 //!
-//! Of zip it reads what SOG needs (APPNOTE.TXT, 4.3): members that are stored or deflated, by the central directory.
+//! The zip reader supports what SOG needs (APPNOTE.TXT, 4.3): members that are stored or deflated, found by the central
+//! directory.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -14,26 +15,26 @@ use crate::numbers::{u16_at, u32_at};
 use crate::siblings::{Siblings, check_plain};
 use crate::unknown::no_sog;
 
-/// First bytes of the header of a member, of its entry in the directory, and of the end of the directory.
+/// First bytes of the header of a member, of an entry of the directory, and of the end of the directory.
 const LOCAL: &[u8] = b"PK\x03\x04";
 const CENTRAL: &[u8] = b"PK\x01\x02";
 const END: &[u8] = b"PK\x05\x06";
-/// Bytes of each, before names and comments.
+/// Number of bytes of each of these, before names and comments.
 const LOCAL_BYTES: usize = 30;
 const CENTRAL_BYTES: usize = 46;
 const END_BYTES: usize = 22;
-/// Longest comment at the end of an archive.
+/// Largest comment at the end of an archive, in bytes.
 const MOST_COMMENT: usize = u16::MAX as usize;
-/// The flag of encrypted members.
+/// Flag of encrypted members.
 const ENCRYPTED: u16 = 1;
-/// The flag of names in UTF-8.
+/// Flag of names in UTF-8.
 const UTF8: u16 = 0x800;
-/// Ways to pack.
+/// Compression methods.
 const STORED: u16 = 0;
 const DEFLATED: u16 = 8;
-/// Version that is needed to unpack stored members: 2.0.
+/// Version needed to extract stored members: 2.0.
 const VERSION: u16 = 20;
-/// The day of all members, for the bytes depend on the scene alone: 1980-01-01.
+/// Date of all members: 1980-01-01. It is fixed so that the bytes depend on the scene alone.
 const DAY: u16 = 1 << 5 | 1;
 
 /// A member of an archive.
@@ -44,7 +45,7 @@ struct Member {
     checksum: u32,
     packed: u32,
     plain: u32,
-    /// Where its header starts.
+    /// Place of the member's header.
     at: u32,
 }
 
@@ -102,7 +103,7 @@ impl<'a> Archive<'a> {
         Ok(Self { name, bytes, members })
     }
 
-    /// Refuses an archive without `called`, the file that makes it a SOG.
+    /// Returns an error for an archive without the file `called`, which makes an archive a SOG.
     pub(super) fn expect(&self, called: &str) -> Result<()> {
         match self.members.contains_key(called) {
             true => Ok(()),
@@ -110,7 +111,7 @@ impl<'a> Archive<'a> {
         }
     }
 
-    /// The content of the member `called`.
+    /// Returns the content of the member `called`.
     fn get(&self, called: &str, limits: &Limits) -> Result<Content<'a>> {
         let malformed = |text: &str| Error::malformed(self.name, format!("member '{called}' {text}"));
         let member = self.members.get(called).ok_or_else(|| malformed("is missing from the zip archive"))?;
@@ -119,7 +120,7 @@ impl<'a> Archive<'a> {
         let start = LOCAL_BYTES + usize::from(u16_at(header, 26)) + usize::from(u16_at(header, 28));
         let packed = header.get(start..).and_then(|rest| rest.get(..member.packed as usize));
         let packed = packed.ok_or_else(|| malformed("is cut off"))?;
-        // What else is in the archive buys no room.
+        // Only the bytes of this member count for the limit, not those of other members.
         let plain = usize::try_from(member.plain).unwrap_or(usize::MAX);
         limits.check_arrays(self.name, packed.len() as u64, plain, 1)?;
         if member.flags & ENCRYPTED != 0 {
@@ -152,14 +153,15 @@ impl<'a> Archive<'a> {
 pub(super) enum Files<'a> {
     /// An archive.
     Archive(Archive<'a>),
-    /// Files beside the one that messages call by the name, in a folder that ends with `/` or has no name.
+    /// Files beside the file that messages call by the first value, in the folder of the last value. A folder's name ends
+    /// with `/`; an empty name is the folder of the file.
     Beside(&'a str, Siblings<'a>, String),
 }
 
 /// The bytes of a file of a SOG.
 #[derive(Debug)]
 pub(super) enum Content<'a> {
-    /// A member of an archive, and the bytes that it takes there.
+    /// The content of a member of an archive, and the number of bytes that it takes in the archive.
     Member(Cow<'a, [u8]>, u64),
     File(Input),
 }
@@ -176,7 +178,7 @@ impl Deref for Content<'_> {
 }
 
 impl Content<'_> {
-    /// The bytes that it takes where it is.
+    /// Returns the number of bytes that the content takes in its archive or file.
     pub(super) fn stored(&self) -> u64 {
         match self {
             Self::Member(_, packed) => *packed,
@@ -186,7 +188,7 @@ impl Content<'_> {
 }
 
 impl<'a> Files<'a> {
-    /// The content of the file `called`.
+    /// Returns the content of the file `called`.
     pub(super) fn get(&self, called: &str, limits: &Limits) -> Result<Content<'a>> {
         match self {
             Self::Archive(archive) => {
@@ -201,7 +203,7 @@ impl<'a> Files<'a> {
     }
 }
 
-/// A zip archive of `members`, stored.
+/// Returns a zip archive of `members`, which are stored without compression.
 ///
 /// # Errors
 /// [`Error::Limit`] for more than 4 GiB.
@@ -218,7 +220,7 @@ pub(super) fn write(members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>> {
         for value in [crc32fast::hash(content), size, size] {
             record.extend(value.to_le_bytes());
         }
-        // The length of the name, and of no extra field.
+        // The length of the name, and the length of the extra field, which is 0.
         record.extend(short(name.len())?.to_le_bytes());
         bytes.extend(LOCAL);
         bytes.extend(&record);
@@ -244,7 +246,7 @@ pub(super) fn write(members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A size or a place of 32 bits.
+/// Returns a size or a place in 32 bits.
 fn short(size: usize) -> Result<u32> {
     let limit = u64::from(u32::MAX);
     u32::try_from(size).map_err(|_| {

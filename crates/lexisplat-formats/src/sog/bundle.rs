@@ -1,4 +1,4 @@
-//! A SOG of several files as one archive.
+//! Bundles a SOG of several files into one archive.
 
 use std::collections::BTreeSet;
 
@@ -9,12 +9,12 @@ use super::{META, ZIP, archive};
 use crate::kind::Kind;
 use crate::siblings::Siblings;
 
-/// Returns the SOG of which `bytes` are `meta.json` as one archive, with the files that it names taken unchanged from
-/// `siblings`. Returns `None` for a scene of any other kind, and for a SOG that is an archive already: they are one file.
+/// Returns the SOG whose `meta.json` has the content `bytes` as one archive. The files that it names are taken unchanged
+/// from `siblings`. Returns `None` for scenes of other formats and for SOG archives, because these are single files.
 ///
 /// # Errors
-/// [`Error::Format`](lexisplat::Error::Format) for a `meta.json` that is damaged, [`Error::Limit`](lexisplat::Error::Limit)
-/// for an archive of more than 4 GiB, and errors of `siblings`.
+/// [`Error::Format`](lexisplat::Error::Format) for a damaged `meta.json`, [`Error::Limit`](lexisplat::Error::Limit) for
+/// an archive of more than 4 GiB, and errors of `siblings`.
 pub fn bundle(name: &str, bytes: &[u8], siblings: Siblings<'_>, limits: &Limits) -> Result<Option<Vec<u8>>> {
     if Kind::of(name, bytes) != Some(Kind::Sog) || bytes.starts_with(ZIP) {
         return Ok(None);

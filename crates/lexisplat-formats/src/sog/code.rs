@@ -1,34 +1,34 @@
-//! Positions and rotations in 16 and 8 bits, as splat-transform has them (`write-sog.ts`, `read-sog.ts`).
+//! Positions in 16 bits and rotations in 8 bits, as in splat-transform (`write-sog.ts`, `read-sog.ts`).
 
-/// The largest code of a position.
+/// Largest code of a position.
 pub(super) const MOST_CODE: f64 = 65_535.0;
-/// The largest byte.
+/// Largest byte.
 const MOST_BYTE: f64 = 255.0;
-/// What the fourth byte of a rotation is if w is the largest part; then follow x, y and z.
+/// Value of the fourth byte of a rotation whose largest part is w. The values for x, y and z follow.
 pub(super) const FIRST_MODE: u8 = 252;
-/// The three other parts by the largest one, of (w, x, y, z).
+/// Indices of the three other parts for each largest part, of (w, x, y, z).
 const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
-/// Between `low` and `high`.
+/// Returns the value at `share` between `low` and `high`.
 pub(super) fn lerp(low: f64, high: f64, share: f64) -> f64 {
     low + (high - low) * share
 }
 
-/// A coordinate as a logarithm, of either sign.
+/// Returns a coordinate as a logarithm with the sign of the coordinate: `ln(|value| + 1)`.
 pub(super) fn to_log(value: f64) -> f64 {
     libm::log(value.abs() + 1.0).copysign(value)
 }
 
-/// The coordinate of `code` between the logarithms `ends`.
+/// Returns the coordinate of `code` between `ends`, which are logarithms.
 #[expect(clippy::cast_possible_truncation, reason = "positions are in single precision")]
 pub(super) fn position(code: u16, [low, high]: [f64; 2]) -> f32 {
-    // A span of nothing is taken as 1, as splat-transform does.
+    // An empty span is taken as 1, as in splat-transform.
     let span = if high == low { 1.0 } else { high - low };
     let log = low + span * (f64::from(code) / MOST_CODE);
     (libm::exp(log.abs()) - 1.0).copysign(log) as f32
 }
 
-/// The code of `value` between the logarithms `ends`, rounded to the nearest.
+/// Returns the code of `value` between `ends`, which are logarithms, rounded to the nearest.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to 16 bits")]
 pub(super) fn to_position(value: f32, [low, high]: [f64; 2]) -> u16 {
     if high > low {
@@ -39,7 +39,7 @@ pub(super) fn to_position(value: f32, [low, high]: [f64; 2]) -> u16 {
     }
 }
 
-/// The rotation (w, x, y, z) of a pixel: none if its last byte is no mode.
+/// Returns the rotation (w, x, y, z) of a pixel. If the last byte is not a mode, there is no rotation: (1, 0, 0, 0).
 #[expect(clippy::cast_possible_truncation, reason = "rotations are in single precision")]
 pub(super) fn rotation([a, b, c, mode]: [u8; 4]) -> [f32; 4] {
     let Some(largest) = mode.checked_sub(FIRST_MODE).map(usize::from) else {
@@ -54,7 +54,7 @@ pub(super) fn rotation([a, b, c, mode]: [u8; 4]) -> [f32; 4] {
     turn
 }
 
-/// The pixel of a rotation of any length.
+/// Returns the pixel of a rotation of any length.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to 8 bits")]
 pub(super) fn to_rotation(turn: [f32; 4]) -> [u8; 4] {
     let turn = turn.map(f64::from);

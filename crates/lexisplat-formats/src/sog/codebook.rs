@@ -1,20 +1,21 @@
-//! Lists of 256 values that stand for many.
+//! Codebooks: lists of 256 values that represent many values.
 
 use std::ops::Range;
 
 use super::LEVELS;
 
-/// Groups of values that the search works on.
+/// Number of groups of values that the search works on.
 const BINS: usize = 4096;
-/// How much the place of a group tells by value rather than by rank. Some of both: dense values get many groups, and those
-/// far out their own (splat-transform blends them too, `quantize-1d-core.ts`).
+/// Weight of a value, relative to its rank, in the choice of its group. With a mixture of both, dense values get many
+/// groups, and values far out get groups of their own (splat-transform mixes both too, `quantize-1d-core.ts`).
 const BY_VALUE: f64 = 0.5;
 
-/// 256 values, ascending, that are near to `values` on the whole. If there are no more than 256, they are the values
-/// themselves. All values are finite.
+/// Returns 256 values in ascending order that are near to `values` on the whole. If there are no more than 256 different
+/// values, the result has them all. All values must be finite.
 ///
-/// The least sum of squares is found, over groups of neighbours that weigh the root of their size: so values far out, which
-/// are seen best, count for more than their number.
+/// The result has the least weighted sum of squared differences. Values are grouped with their neighbours, and the weight
+/// of a group is the square root of its size. Values far out, which are seen best, therefore count for more than their
+/// number.
 #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
 pub(super) fn codebook(values: &[f32]) -> [f32; LEVELS] {
     let mut sorted: Vec<f32> = values.to_vec();
@@ -30,11 +31,12 @@ pub(super) fn codebook(values: &[f32]) -> [f32; LEVELS] {
     book
 }
 
-/// The means of the runs of `bins` whose squares around them are least, [`LEVELS`] at most; the last fills up.
+/// Returns the means of at most [`LEVELS`] runs of `bins`, chosen so that the sum of squares around the means is least.
+/// The last mean is repeated to fill the array.
 fn runs(bins: &[[f64; 2]]) -> [f64; LEVELS] {
     let sums = Sums::new(bins);
     let count = LEVELS.min(bins.len());
-    // The least squares of the first so many groups in one run, then in two, and so on.
+    // Least sums of squares of the first groups, for each number of groups: in one run, then in two runs, and so on.
     let mut least: Vec<f64> = (0..=bins.len()).map(|end| sums.squares(0, end)).collect();
     let mut starts = vec![vec![0; bins.len() + 1]];
     for _ in 1..count {
@@ -53,8 +55,8 @@ fn runs(bins: &[[f64; 2]]) -> [f64; LEVELS] {
     means
 }
 
-/// Sums of weights, of values times weights, and of squares times weights, of the first so many groups. Values are beside
-/// `middle`, so that squares keep their digits.
+/// Prefix sums over the groups: of weights, of values times weights, and of squared values times weights. Values are
+/// relative to `middle`, so that squares do not lose digits.
 struct Sums {
     middle: f64,
     sums: Vec<[f64; 3]>,
@@ -77,20 +79,21 @@ impl Sums {
         [0, 1, 2].map(|k| self.sums[end][k] - self.sums[start][k])
     }
 
-    /// The mean of groups `start` to `end`, if there are any.
+    /// Returns the mean of groups `start` to before `end`; `None` if there are none.
     fn mean(&self, start: usize, end: usize) -> Option<f64> {
         let [weight, sum, _] = self.of(start, end);
         (end > start).then(|| self.middle + sum / weight)
     }
 
-    /// Their weighted squares around their mean.
+    /// Returns the weighted sum of squares of these groups around their mean.
     fn squares(&self, start: usize, end: usize) -> f64 {
         let [weight, sum, square] = self.of(start, end);
         if end > start { (square - sum * sum / weight).max(0.0) } else { 0.0 }
     }
 
-    /// For each of `ends` where the last run starts, which is within `bounds`, and the least squares of all runs. `least`
-    /// are those of one run less. The start never falls while the end rises, so each end halves the bounds of the others.
+    /// Finds for each of `ends` the start of the last run, which is within `bounds`, and the least sum of squares of all
+    /// runs. `least` has the sums for one run less. The start never falls as the end rises, so each end that is solved
+    /// narrows the bounds of the others.
     fn last_run(
         &self,
         least: &[f64],
@@ -117,7 +120,7 @@ impl Sums {
     }
 }
 
-/// Groups of `sorted`: the mean of each, and what it weighs.
+/// Returns the groups of `sorted`: the mean of each, and its weight.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -139,7 +142,7 @@ fn bins(sorted: &[f32]) -> Vec<[f64; 2]> {
     sums.iter().map(|[sum, count]| [sum / count, count.sqrt()]).collect()
 }
 
-/// The number of the entry of `book`, which ascends, that is nearest to `value`.
+/// Returns the number of the entry of `book`, which is in ascending order, that is nearest to `value`.
 pub(super) fn nearest(book: &[f32; LEVELS], value: f32) -> u8 {
     let above = book.partition_point(|v| *v < value).min(LEVELS - 1);
     let below = above.saturating_sub(1);

@@ -7,12 +7,12 @@ use super::LEVELS;
 use super::code::{lerp, position};
 use crate::opacity::{MOST, logits};
 
-/// The version that is written. A file without a version has the first.
+/// Version that is written. A file without a version has version 1.
 pub(super) const VERSION: u64 = 2;
-/// Degrees by number of bands.
+/// Largest number of bands, which is the SH degree.
 const MOST_BANDS: u64 = 3;
 
-/// The values of 8 bits.
+/// The values of the 256 codes of 8 bits.
 pub(super) type Table = [f32; LEVELS];
 
 #[derive(Debug, Deserialize)]
@@ -38,7 +38,7 @@ struct RawAsset {
 
 #[derive(Debug, Deserialize)]
 struct RawMeans {
-    /// Version 1.
+    /// Only in version 1.
     shape: Option<Vec<u64>>,
     mins: Vec<f64>,
     maxs: Vec<f64>,
@@ -53,7 +53,7 @@ struct RawFiles {
 #[derive(Debug, Deserialize)]
 struct RawValues {
     codebook: Option<Vec<Option<f64>>>,
-    /// Version 1.
+    /// Only in version 1.
     mins: Option<Vec<f64>>,
     maxs: Option<Vec<f64>>,
     files: Vec<String>,
@@ -64,24 +64,24 @@ struct RawSh {
     count: Option<u64>,
     bands: Option<u64>,
     codebook: Option<Vec<Option<f64>>>,
-    /// Version 1.
+    /// Only in version 1.
     mins: Option<f64>,
     maxs: Option<f64>,
     files: Vec<String>,
 }
 
-/// What `meta.json` says.
+/// The contents of `meta.json`.
 #[derive(Debug)]
 pub(super) struct Meta {
     pub(super) version: u64,
     pub(super) count: u64,
     pub(super) antialiased: bool,
     pub(super) generator: Option<String>,
-    /// The ends of positions along each axis, as logarithms.
+    /// Ends of the range of positions along each axis, as logarithms.
     pub(super) ends: [[f64; 2]; 3],
-    /// Of each axis.
+    /// Values of the scales along each axis.
     pub(super) scales: [Table; 3],
-    /// Of each colour.
+    /// Values of each colour channel.
     pub(super) colours: [Table; 3],
     pub(super) opacities: Table,
     pub(super) means_files: [String; 2],
@@ -92,13 +92,13 @@ pub(super) struct Meta {
     pub(super) warnings: Vec<String>,
 }
 
-/// What it says of SH.
+/// The statements of `meta.json` about SH.
 #[derive(Debug)]
 pub(super) struct ShMeta {
-    /// The degree, and how many entries the palette has. In version 1 the picture tells them.
+    /// SH degree and number of entries of the palette. In version 1 they follow from the picture, and this is `None`.
     pub(super) palette: Option<(ShDegree, usize)>,
     pub(super) values: Table,
-    /// Of the palette, and of each Gaussian's entry.
+    /// Files of the palette, and of each Gaussian's entry.
     pub(super) files: [String; 2],
 }
 
@@ -148,7 +148,7 @@ fn first([name]: [String; 1]) -> String {
     name
 }
 
-/// Checks what a file says.
+/// Checks the values of a file.
 struct Reader<'a> {
     name: &'a str,
     version: u64,
@@ -160,7 +160,7 @@ impl Reader<'_> {
         Error::malformed(self.name, format!("meta.json: {text}"))
     }
 
-    /// `N` finite numbers, the property `what`.
+    /// Returns the `N` finite numbers of the property `what`.
     fn numbers<const N: usize>(&self, what: &str, values: Option<&Vec<f64>>) -> Result<[f64; N]> {
         let values = values.ok_or_else(|| self.malformed(&format!("'{what}' is missing")))?;
         let found = values.first_chunk::<N>().filter(|_| values.len() == N);
@@ -170,7 +170,7 @@ impl Reader<'_> {
         Ok(*found)
     }
 
-    /// Refuses values that single precision does not hold.
+    /// Returns an error if a value is out of the range of single precision.
     fn finite(&self, what: &str, values: &[f64]) -> Result<()> {
         match values.iter().find(|v| v.abs() > f64::from(f32::MAX)) {
             Some(value) => Err(self.malformed(&format!("'{what}' has {value}, which is out of range"))),
@@ -178,7 +178,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The values of scales, colours and opacities.
+    /// Returns the values of scales, colours and opacities.
     fn values(&mut self, scales: &RawValues, sh0: &RawValues) -> Result<[[Table; 3]; 3]> {
         if self.version < VERSION {
             let [low, high] = [&scales.mins, &scales.maxs].map(Option::as_ref);
@@ -198,7 +198,7 @@ impl Reader<'_> {
         Ok([[scales; 3], [colours; 3], [logits(); 3]])
     }
 
-    /// A list of 256 values.
+    /// Returns a list of 256 values.
     #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
     fn codebook(&mut self, what: &str, values: Option<&[Option<f64>]>) -> Result<Table> {
         let values = values.ok_or_else(|| self.malformed(&format!("'{what}' is missing")))?;
@@ -209,7 +209,7 @@ impl Reader<'_> {
         let mut numbers: Vec<f64> = values.iter().map(|v| v.unwrap_or_default()).collect();
         match values.iter().position(Option::is_none) {
             None => {}
-            // Files of an early splat-transform; PlayCanvas' engine takes the same value (`_patchCodebooks`).
+            // Files of an early splat-transform. The engine of `PlayCanvas` assumes the same value (`_patchCodebooks`).
             Some(0) if values.iter().skip(1).all(Option::is_some) => {
                 self.warnings.push(format!("the first value of {what} is missing, and is continued"));
                 numbers[0] = numbers[1] + (numbers[1] - numbers[LEVELS - 1]) / f64::from(MOST);
@@ -238,14 +238,14 @@ impl Reader<'_> {
         Ok(ShMeta { palette: Some((ShDegree::new(degree)?, entries)), values, files })
     }
 
-    /// The names of `N` files.
+    /// Returns the names of `N` files.
     fn files<const N: usize>(&self, what: &str, files: Vec<String>) -> Result<[String; N]> {
         let found = files.len();
         files.try_into().map_err(|_| self.malformed(&format!("'{what}.files' has {found} names, not {N}")))
     }
 }
 
-/// Steps between two values.
+/// Returns 256 values in equal steps from `low` to `high`.
 #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
 fn table(low: f64, high: f64) -> Table {
     std::array::from_fn(|k| lerp(low, high, k as f64 / f64::from(MOST)) as f32)

@@ -1,10 +1,10 @@
-//! `PlayCanvas`' SOG: values of 8 bits in pictures, and `meta.json` that says what they mean (specification: "The SOG
+//! `PlayCanvas`' SOG: values of 8 bits in pictures, and a `meta.json` with their meaning (specification: "The SOG
 //! format", developer.playcanvas.com; splat-transform, `write-sog.ts`, `read-sog.ts` and `read-sog-v1.ts`).
 //!
-//! A pixel of each picture belongs to a Gaussian. Positions have 16 bits along each axis, in two pictures, between ends that
-//! `meta.json` has as logarithms. Scales and colours are numbers of entries of a list of 256 values, rotations the three
-//! smallest parts. SH are numbers of entries of a palette, which is a picture too. Version 1 has steps between two ends in
-//! place of lists, and is read.
+//! A pixel of each picture belongs to a Gaussian. Positions have 16 bits along each axis, in two pictures. They are
+//! between ends that `meta.json` has as logarithms. Scales and colours are indices into lists of 256 values. Rotations
+//! are their three smallest parts. SH are indices into a palette, which is a picture too. Version 1 has equal steps
+//! between two ends instead of lists. It can be read, but is not written.
 
 mod archive;
 mod bundle;
@@ -33,29 +33,29 @@ use crate::siblings::Siblings;
 pub use self::bundle::bundle;
 pub(crate) use self::write::write;
 
-/// The name of the file that describes the others.
+/// Name of the file that describes the others.
 const META: &str = "meta.json";
-/// Values of a byte.
+/// Number of values of a byte.
 const LEVELS: usize = 256;
-/// Entries of the palette in a row of its picture.
+/// Number of entries of the palette in a row of its picture.
 const ENTRIES_PER_ROW: usize = 64;
-/// Most entries of a palette, whose numbers have 16 bits.
+/// Largest number of entries of a palette. Their indices have 16 bits.
 const MOST_ENTRIES: usize = 1 << 16;
-/// Most SH coefficients of a channel in a palette, with room for degree 4.
+/// Largest number of SH coefficients of a channel in a palette. It has room for degree 4.
 const MOST_REST: usize = 24;
-/// Most pixels of a picture for each Gaussian: sides that are powers of two and alike need up to 4. A picture of up to [`SMALL`]
-/// pixels may be larger.
+/// Largest number of pixels of a picture for each Gaussian. A picture whose sides are equal powers of two needs up to 4.
+/// A picture of up to [`SMALL`] pixels may have more.
 const MOST_SPARE: usize = 4;
 const SMALL: usize = 1 << 20;
 /// First bytes of a zip archive.
 const ZIP: &[u8] = b"PK";
 
-/// Reads the SOG in `bytes`, which messages call `name`: an archive, `meta.json` beside the pictures that `siblings` gives, or
-/// `lod-meta.json` beside folders of SOGs.
+/// Reads the SOG in `bytes`, which messages call `name`: an archive, a `meta.json` beside pictures, or a `lod-meta.json`
+/// beside folders of SOGs. Other files come from `siblings`.
 ///
 /// # Errors
-/// [`Error::Format`] for what is missing or damaged, [`Error::Limit`] for pictures that are too large, and errors of
-/// `siblings`.
+/// [`Error::Format`] for files that are missing or damaged, [`Error::Limit`] for pictures that are too large, and errors
+/// of `siblings`.
 pub(crate) fn read<'a>(
     name: &'a str,
     bytes: &'a [u8],
@@ -71,23 +71,24 @@ pub(crate) fn read<'a>(
     Ok((Described { rows: Box::new(rows), len, degree, meta, warnings, facts }, sizes))
 }
 
-/// Bytes of the files of a SOG.
+/// Numbers of bytes of the files of a SOG.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sizes {
-    /// All of them.
+    /// Number of bytes of all files.
     pub(crate) all: u64,
-    /// Those that count when limits are checked: of files and members that are read, and of each no more than its picture.
+    /// Number of bytes that count when limits are checked: those of files and members that are read, for each at most the
+    /// bytes of its picture.
     pub(crate) counted: u64,
 }
 
 impl Sizes {
-    /// Those of one file of `bytes` bytes.
+    /// Returns the sizes of a single file of `bytes` bytes.
     pub(crate) fn of(bytes: usize) -> Self {
         Self { all: bytes as u64, counted: bytes as u64 }
     }
 }
 
-/// One SOG.
+/// One SOG of a scene.
 #[derive(Debug)]
 struct Unit {
     rows: SogRows,
@@ -99,7 +100,8 @@ struct Unit {
     sizes: Sizes,
 }
 
-/// Reads the SOG in `bytes`, an archive or the `meta.json` of `folder`, which ends with `/` or is that of `siblings`.
+/// Reads the SOG in `bytes`: an archive, or the `meta.json` of `folder`. The name of a folder ends with `/`; an empty
+/// name is the folder of `siblings`.
 fn unit(name: &str, bytes: &[u8], siblings: Siblings<'_>, folder: String, limits: &Limits) -> Result<Unit> {
     let is_archive = bytes.starts_with(ZIP);
     let (files, meta, stored) = if is_archive {
@@ -164,9 +166,9 @@ struct Loader<'a> {
     files: Files<'a>,
     /// Number of Gaussians.
     len: usize,
-    /// Files that were written with loss.
+    /// Names of files that were written with loss.
     lossy: Vec<String>,
-    /// Bytes of all files.
+    /// Number of bytes of all files.
     all_bytes: u64,
     budget: Budget<'a>,
 }
@@ -176,7 +178,7 @@ impl Loader<'_> {
         Error::malformed(self.budget.name, text)
     }
 
-    /// The picture in the file `called`, of at most `most` pixels.
+    /// Returns the picture in the file `called`, of at most `most` pixels.
     fn picture(&mut self, called: &str, most: usize) -> Result<Picture> {
         let content = self.files.get(called, self.budget.limits)?;
         let stored = content.stored();
@@ -188,7 +190,7 @@ impl Loader<'_> {
         Ok(picture)
     }
 
-    /// The picture in the file `called`, which has a pixel for each Gaussian.
+    /// Returns the picture in the file `called`, which has a pixel for each Gaussian.
     fn load(&mut self, called: &str) -> Result<Picture> {
         let picture = self.picture(called, self.len.saturating_mul(MOST_SPARE).max(SMALL))?;
         if picture.len() < self.len {
@@ -237,20 +239,20 @@ impl Loader<'_> {
     }
 }
 
-/// SH of some Gaussians in common.
+/// SH entries that Gaussians share.
 #[derive(Debug)]
 struct Palette {
     degree: ShDegree,
     entries: usize,
-    /// A pixel for each coefficient of an entry.
+    /// Picture with a pixel for each coefficient of each entry.
     picture: Picture,
-    /// The entry of each Gaussian.
+    /// Picture with the index of each Gaussian's entry.
     labels: Picture,
     values: Table,
 }
 
 impl Palette {
-    /// The entry of Gaussian `i`.
+    /// Returns the index of the entry of Gaussian `i`.
     fn label(&self, i: usize) -> usize {
         let [low, high, ..] = self.labels.pixel(i);
         u16::from_le_bytes([low, high]).into()
@@ -259,7 +261,7 @@ impl Palette {
     /// Decodes the SH of Gaussian `i`, channel by channel.
     fn fill(&self, i: usize, rest: &mut [f32]) {
         let per = self.degree.rest_per_channel();
-        // Entries follow each other, for a row of the picture ends with an entry.
+        // The entries follow each other without gaps, because a row of the picture ends with an entry.
         let at = self.label(i) * per;
         for k in 0..per {
             let pixel = self.picture.pixel(at + k);
@@ -273,7 +275,7 @@ impl Palette {
 #[derive(Debug)]
 struct SogRows {
     ends: [[f64; 2]; 3],
-    /// The low and high bytes of positions.
+    /// Low and high bytes of positions.
     means: [Picture; 2],
     quats: Picture,
     scales: Picture,

@@ -1,10 +1,10 @@
-//! A palette of SH: rows of coefficients that stand for many.
+//! A palette of SH: rows of coefficients that represent many rows.
 //!
-//! First groups are split where the error is largest ([`super::tree`]). Then a few rounds of Lloyd's algorithm move the
-//! entries. An exact search for the nearest of 65,536 entries would take minutes for each round, so a row looks only at the
-//! entries of the groups of entries that are nearest to it.
+//! First the group of the largest error is split, until there are enough groups ([`super::tree`]). Then a few rounds of
+//! Lloyd's algorithm move the entries. An exact search for the nearest of 65,536 entries would take minutes for each
+//! round. Entries are therefore grouped, and a row is compared only with the entries of the groups nearest to it.
 //!
-//! All sums are taken in one order, whatever the number of threads.
+//! All sums are taken in the same order for any number of threads.
 
 use std::collections::HashMap;
 
@@ -12,25 +12,25 @@ use lexisplat::{Progress, Result};
 
 use super::tree;
 
-/// Sums that are taken side by side. Rows are multiples of it.
+/// Number of sums that are taken side by side. Widths of rows are multiples of it.
 pub(super) const LANES: usize = 8;
-/// Rounds of Lloyd's algorithm.
+/// Number of rounds of Lloyd's algorithm.
 const ROUNDS: usize = 6;
-/// Groups of entries whose entries a row looks at.
+/// Number of groups of entries whose entries a row is compared with.
 const PROBES: usize = 16;
-/// Most groups of entries.
+/// Largest number of groups of entries.
 const MOST_GROUPS: usize = 512;
-/// Most rows that the entries are found from; if there are more, every second, third... counts.
+/// Largest number of rows from which the entries are found. Of more rows every second, every third and so on is used.
 const MOST_TRAINING: usize = 1 << 20;
-/// Rows of one task.
+/// Number of rows of one task.
 const ROWS_PER_TASK: usize = 1024;
 
 /// Rows of numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rows<'a> {
-    /// Values of all, row by row.
+    /// Values of all rows, row by row.
     pub(super) values: &'a [f32],
-    /// Values of one, a multiple of [`LANES`]; the last may be padding, which is 0.
+    /// Number of values of a row, a multiple of [`LANES`]. The last values may be padding, which is 0.
     pub(super) width: usize,
 }
 
@@ -44,18 +44,19 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Entries, and which of them each row has.
+/// The entries, and the index of each row's entry.
 #[derive(Debug, PartialEq)]
 pub(super) struct Palette {
-    /// Rows of the same width. No row comes before one that an earlier row of the scene has.
+    /// Entries, which have the width of the rows. They are in the order in which the rows of the scene first use them.
     pub(super) entries: Vec<f32>,
     pub(super) labels: Vec<u32>,
 }
 
-/// A palette of at most `most` entries for `rows`; with as few different rows, it is they themselves.
+/// Returns a palette of at most `most` entries for `rows`. If there are at most `most` different rows, the entries are
+/// these rows.
 ///
 /// # Errors
-/// [`Error::Cancelled`](lexisplat::Error::Cancelled) soon after `progress` cancels, which every split and every task asks.
+/// [`Error::Cancelled`](lexisplat::Error::Cancelled) soon after `progress` cancels. Every split and every task asks it.
 pub(super) fn palette(rows: Rows<'_>, most: usize, progress: &dyn Progress) -> Result<Palette> {
     if let Some(palette) = distinct(rows, most) {
         return Ok(palette);
@@ -74,7 +75,7 @@ pub(super) fn palette(rows: Rows<'_>, most: usize, progress: &dyn Progress) -> R
     Ok(by_appearance(&entries, labels, rows.width))
 }
 
-/// The different rows, if they are no more than `most`.
+/// Returns a palette of the different rows; `None` if there are more than `most`.
 fn distinct(rows: Rows<'_>, most: usize) -> Option<Palette> {
     let mut seen = HashMap::new();
     let mut palette = Palette { entries: Vec::new(), labels: Vec::with_capacity(rows.len()) };
@@ -93,7 +94,7 @@ fn distinct(rows: Rows<'_>, most: usize) -> Option<Palette> {
     Some(palette)
 }
 
-/// Orders entries as the rows have them first, and leaves out those that none has.
+/// Sorts entries into the order in which rows first use them, and removes unused entries.
 fn by_appearance(entries: &[f32], mut labels: Vec<u32>, width: usize) -> Palette {
     let entries = Rows { values: entries, width };
     let mut places = vec![u32::MAX; entries.len()];
@@ -111,7 +112,7 @@ fn by_appearance(entries: &[f32], mut labels: Vec<u32>, width: usize) -> Palette
     Palette { entries: ordered, labels }
 }
 
-/// The squared distance of two rows.
+/// Returns the squared distance of two rows.
 pub(super) fn distance(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; LANES];
     for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
@@ -124,18 +125,18 @@ pub(super) fn distance(a: &[f32], b: &[f32]) -> f32 {
     ((a + b) + (c + d)) + ((e + f) + (g + h))
 }
 
-/// Adds a row to sums.
+/// Adds a row to `sums`.
 pub(super) fn add(sums: &mut [f64], row: &[f32]) {
     sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += f64::from(*v));
 }
 
-/// Entries in groups of like ones.
+/// Entries in groups of similar entries.
 struct Groups {
     means: Vec<f32>,
-    /// The entries, group by group, and their numbers.
+    /// Entries group by group. Below: their indices in the palette.
     entries: Vec<f32>,
     numbers: Vec<u32>,
-    /// Where each group starts, and where the last ends.
+    /// Start of each group, and the end of the last.
     starts: Vec<usize>,
 }
 
@@ -159,7 +160,7 @@ impl Groups {
         Ok(Self { means, entries: values, numbers, starts })
     }
 
-    /// The entry near to `row`, and its squared distance. `order` is scratch.
+    /// Returns the index of an entry near to `row`, and its squared distance. `order` is scratch memory.
     fn nearest(&self, row: &[f32], order: &mut Vec<(f32, usize)>) -> (u32, f32) {
         let width = row.len();
         order.clear();
@@ -183,7 +184,7 @@ impl Groups {
     }
 }
 
-/// The first of the nearest of `rows`, and its squared distance.
+/// Returns the index of the first of the nearest `rows`, and its squared distance.
 fn best<'a>(rows: impl Iterator<Item = (u32, &'a [f32])>, row: &[f32]) -> (u32, f32) {
     let mut found = (0, f32::INFINITY);
     for (number, other) in rows {
@@ -195,7 +196,7 @@ fn best<'a>(rows: impl Iterator<Item = (u32, &'a [f32])>, row: &[f32]) -> (u32, 
     found
 }
 
-/// Gives each row an entry near to it. Returns the squared distances.
+/// Assigns each row an entry near to it. Returns the squared distances.
 fn assign(rows: Rows<'_>, entries: &[f32], labels: &mut [u32], progress: &dyn Progress) -> Result<Vec<f32>> {
     let groups = Groups::new(Rows { values: entries, width: rows.width }, progress)?;
     let mut found: Vec<(u32, f32)> = vec![(0, 0.0); rows.len()];
@@ -209,7 +210,7 @@ fn assign(rows: Rows<'_>, entries: &[f32], labels: &mut [u32], progress: &dyn Pr
     Ok(found.iter().map(|found| found.1).collect())
 }
 
-/// Moves each entry to the mean of its rows. Entries without rows go to the rows that are farthest from theirs.
+/// Moves each entry to the mean of its rows. Entries without rows move to the rows that are farthest from their entries.
 fn update(rows: Rows<'_>, labels: &[u32], distances: &[f32], entries: &mut [f32]) {
     let width = rows.width;
     let mut sums = vec![0.0_f64; entries.len()];
@@ -235,8 +236,8 @@ fn update(rows: Rows<'_>, labels: &[u32], distances: &[f32], entries: &mut [f32]
     }
 }
 
-/// Works on parts of `items`, on all cores if there are threads. The work gets the number of the first item. Once `progress`
-/// cancels, no more parts are begun.
+/// Processes parts of `items`, on all cores if there are threads. The function gets the index of the first item of a
+/// part. Once `progress` cancels, no further parts are begun.
 fn each_part<T: Send>(
     items: &mut [T],
     progress: &dyn Progress,

@@ -1,17 +1,17 @@
-//! The pictures of a SOG: values of 8 bits in WebP without loss.
+//! The pictures of a SOG: values of 8 bits in lossless WebP.
 
 use std::io::Cursor;
 
 use image_webp::{ColorType, EncoderParams, WebPDecoder, WebPEncoder};
 use lexisplat::{Error, Limits, Result};
 
-/// Bytes of a pixel with opacity.
+/// Number of bytes of a pixel with opacity.
 pub(super) const RGBA: usize = 4;
-/// Bytes of a pixel without.
+/// Number of bytes of a pixel without opacity.
 const RGB: usize = 3;
-/// Most pixels along a side of a WebP (RFC 9649, 2.4: 14 bits).
+/// Largest number of pixels along a side of a WebP (RFC 9649, 2.4: 14 bits).
 pub(super) const MOST_SIDE: usize = 1 << 14;
-/// Bytes that a decoder may hold of what is beside the pixels, such as metadata.
+/// Largest number of bytes that a decoder may hold besides the pixels, such as metadata.
 const MOST_BESIDE: usize = 1 << 20;
 
 /// The memory that all pictures of a scene may take.
@@ -19,26 +19,28 @@ const MOST_BESIDE: usize = 1 << 20;
 pub(super) struct Budget<'a> {
     pub(super) name: &'a str,
     pub(super) limits: &'a Limits,
-    /// Bytes of all files read, of each picture at most as many as its pixels take: what else a file holds buys no room.
+    /// Number of bytes of all files read. A file counts for at most the bytes of its pixels, so that other contents do
+    /// not raise the limit.
     pub(super) file_bytes: u64,
-    /// Bytes of all pictures decoded.
+    /// Number of bytes of all decoded pictures.
     pub(super) taken: usize,
 }
 
-/// A picture, decoded.
+/// A decoded picture.
 #[derive(Debug)]
 pub(super) struct Picture {
     pub(super) width: usize,
     pub(super) height: usize,
-    /// Bytes of a pixel, 3 or 4.
+    /// Number of bytes of a pixel, 3 or 4.
     each: usize,
     pixels: Vec<u8>,
-    /// Whether values were lost when it was written.
+    /// Whether the picture was written with loss.
     pub(super) is_lossy: bool,
 }
 
 impl Picture {
-    /// Decodes the WebP `bytes`, the file `called`, which takes `stored` bytes and has at most `most` pixels.
+    /// Decodes the WebP `bytes` of the file `called`, which takes `stored` bytes. The picture may have at most `most`
+    /// pixels.
     pub(super) fn read(
         called: &str,
         (bytes, stored): (&[u8], u64),
@@ -72,12 +74,12 @@ impl Picture {
         Ok(Self { width, height, each, pixels, is_lossy: decoder.is_lossy() })
     }
 
-    /// How many pixels there are.
+    /// Returns the number of pixels.
     pub(super) fn len(&self) -> usize {
         self.width * self.height
     }
 
-    /// Pixel number `i`, row by row. What has no opacity is opaque.
+    /// Returns pixel number `i`, counted row by row. A pixel without opacity is opaque.
     pub(super) fn pixel(&self, i: usize) -> [u8; RGBA] {
         match *self.pixels.get(i * self.each..).unwrap_or_default() {
             [r, g, b, a, ..] if self.each == RGBA => [r, g, b, a],
@@ -87,7 +89,7 @@ impl Picture {
     }
 }
 
-/// `pixels` as a WebP of `width` and `height`, which keeps all values of transparent pixels too.
+/// Returns `pixels` as a WebP of `width` and `height`. The values of transparent pixels are kept too.
 pub(super) fn write(pixels: &[[u8; RGBA]], width: usize, height: usize) -> Result<Vec<u8>> {
     let opaque = pixels.iter().all(|pixel| pixel[3] == u8::MAX);
     let data: Vec<u8> = if opaque {

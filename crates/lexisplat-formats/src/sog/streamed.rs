@@ -1,8 +1,8 @@
-//! Streamed SOG: `lod-meta.json`, which names SOGs of parts of a scene in several levels of detail (specification: "The Streamed
-//! SOG format", developer.playcanvas.com).
+//! Streamed SOG: a `lod-meta.json` that names SOGs of parts of a scene in several levels of detail (specification: "The
+//! Streamed SOG format", developer.playcanvas.com).
 //!
-//! Leaves of a tree say for each level which Gaussians of which SOG are theirs. The finest level is read, and the environment,
-//! which is shown at every level.
+//! A leaf of the tree states for each level which Gaussians of which SOG belong to the leaf. The finest level is read,
+//! and so is the environment, which is shown at every level.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -19,7 +19,7 @@ use super::{Sizes, SogRows, unit};
 use crate::rows::{Described, Rows, RowsMut};
 use crate::siblings::Siblings;
 
-/// The version that is read. A file without one has it too.
+/// Version that is read. A file without a version has this version too.
 const VERSION: u64 = 1;
 
 #[derive(Debug, Deserialize)]
@@ -27,7 +27,7 @@ const VERSION: u64 = 1;
 struct Index {
     #[serde(default)]
     version: Option<u64>,
-    /// Gaussians of each level.
+    /// Number of Gaussians of each level.
     #[serde(default)]
     counts: Vec<u64>,
     #[serde(default)]
@@ -40,11 +40,11 @@ struct Index {
 #[serde(default)]
 struct Node {
     children: Vec<Node>,
-    /// By level, of which 0 is the finest.
+    /// References by level. Level 0 is the finest.
     lods: BTreeMap<u32, Reference>,
 }
 
-/// Gaussians of a SOG.
+/// A run of Gaussians of a SOG.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 struct Reference {
     file: usize,
@@ -58,20 +58,21 @@ impl Reference {
     }
 }
 
-/// Names in a `lod-meta.json` that tell it from other files of JSON.
+/// Names in a `lod-meta.json` that distinguish it from other JSON files.
 #[derive(Deserialize)]
 struct Marks {
     filenames: Option<IgnoredAny>,
     tree: Option<IgnoredAny>,
 }
 
-/// Whether `bytes` are a `lod-meta.json`.
+/// Returns whether `bytes` are a `lod-meta.json`.
 pub(super) fn is_index(bytes: &[u8]) -> bool {
     let marks = serde_json::from_slice::<Marks>(bytes);
     marks.is_ok_and(|marks| marks.filenames.is_some() && marks.tree.is_some())
 }
 
-/// Reads the finest level of the streamed SOG whose `lod-meta.json` has `bytes`, which messages call `name`.
+/// Reads the finest level of the streamed SOG whose `lod-meta.json` has the content `bytes`. Messages call the file
+/// `name`.
 ///
 /// # Errors
 /// As [`read`](super::read()).
@@ -153,7 +154,7 @@ pub(super) fn read<'a>(
     Ok((described, found.sizes))
 }
 
-/// What was found beside the Gaussians.
+/// Facts that were found besides the Gaussians.
 #[derive(Debug, Default)]
 struct Found {
     sizes: Sizes,
@@ -161,7 +162,7 @@ struct Found {
     warnings: Vec<String>,
 }
 
-/// The finest level with Gaussians, and which they are, by file and place.
+/// Returns the finest level with Gaussians, and the references to these Gaussians, sorted by file and place.
 fn finest(tree: &Node) -> (u32, Vec<Reference>) {
     let (mut level, mut references) = (u32::MAX, Vec::new());
     let mut left = vec![tree];
@@ -186,7 +187,7 @@ fn finest(tree: &Node) -> (u32, Vec<Reference>) {
 struct Streamed {
     units: Vec<SogRows>,
     segments: Vec<Segment>,
-    /// The highest of all.
+    /// Highest SH degree of all SOGs.
     degree: ShDegree,
     len: usize,
 }
@@ -196,14 +197,14 @@ struct Streamed {
 struct Segment {
     unit: usize,
     degree: ShDegree,
-    /// Gaussians of the SOG.
+    /// The Gaussians within the SOG.
     range: Range<usize>,
-    /// Number of the first in the scene.
+    /// Number of the first Gaussian in the scene.
     start: usize,
 }
 
 impl Streamed {
-    /// Adds Gaussians of a SOG, which has as many.
+    /// Adds the Gaussians `references` of a SOG, which must have them all.
     fn add(&mut self, rows: SogRows, degree: ShDegree, references: &[Reference]) {
         let unit = self.units.len();
         self.units.push(rows);
@@ -244,7 +245,7 @@ impl Rows for Streamed {
     }
 }
 
-/// Copies rows of SH-rest of degree `from` to rows of the higher degree `to`, in which what is missing is 0.
+/// Copies rows of SH-rest of degree `from` to rows of the higher degree `to`. Missing coefficients are 0.
 fn raise(rows: &[f32], from: ShDegree, out: &mut [f32], to: ShDegree) {
     out.fill(0.0);
     let (short, long) = (from.rest_per_channel(), to.rest_per_channel());

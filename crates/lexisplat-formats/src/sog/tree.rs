@@ -1,4 +1,4 @@
-//! Groups of like rows, by splitting the group of the largest error until there are enough.
+//! Groups similar rows: splits the group of the largest error until there are enough groups.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -8,16 +8,16 @@ use lexisplat::{Progress, Result};
 
 use super::palette::{Rows, add, distance};
 
-/// Steps of the search for the direction of the largest spread.
+/// Number of steps of the search for the direction of the largest spread.
 const POWER_STEPS: usize = 3;
 
-/// Rows that are like one another.
+/// A group of similar rows.
 #[derive(Debug)]
 struct Group {
-    /// Where its rows are in the order.
+    /// Place of the group's rows in the order.
     range: Range<usize>,
     mean: Vec<f64>,
-    /// The sum of the squared distances to the mean.
+    /// Sum of the squared distances to the mean.
     error: f64,
 }
 
@@ -35,14 +35,14 @@ impl PartialOrd for Group {
     }
 }
 
-/// By the error. Ranges differ, so the order is one.
+/// Groups are ordered by their error. Groups of equal error are ordered by their ranges, which differ.
 impl Ord for Group {
     fn cmp(&self, other: &Self) -> Ordering {
         self.error.total_cmp(&other.error).then_with(|| other.range.start.cmp(&self.range.start))
     }
 }
 
-/// The means of at most `most` groups of `rows`, one after the other. Ends with an error once `progress` cancels.
+/// Returns the means of at most `most` groups of `rows`, one after the other. Returns an error once `progress` cancels.
 pub(super) fn split(rows: Rows<'_>, most: usize, progress: &dyn Progress) -> Result<Vec<f32>> {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     let mut scratch = Vec::with_capacity(rows.len());
@@ -68,7 +68,7 @@ pub(super) fn split(rows: Rows<'_>, most: usize, progress: &dyn Progress) -> Res
     Ok(means)
 }
 
-/// The group of the rows `order[range]`.
+/// Returns the group of the rows `order[range]`.
 fn group(rows: Rows<'_>, order: &[usize], range: Range<usize>) -> Group {
     let members = &order[range.clone()];
     let mut mean = vec![0.0; rows.width];
@@ -81,8 +81,8 @@ fn group(rows: Rows<'_>, order: &[usize], range: Range<usize>) -> Group {
     Group { range, mean, error }
 }
 
-/// Orders `members` by the side of the mean that they are on, along the direction of their largest spread. Returns how many
-/// are on the first side, or 0 if all are alike.
+/// Orders `members` by their side of the mean, along the direction of their largest spread. Returns the number of rows on
+/// the first side, or 0 if all rows are equal.
 fn cut(rows: Rows<'_>, members: &mut [usize], mean: &[f64], scratch: &mut Vec<usize>) -> usize {
     #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
     let mean: Vec<f32> = mean.iter().map(|v| *v as f32).collect();
@@ -124,7 +124,7 @@ fn cut(rows: Rows<'_>, members: &mut [usize], mean: &[f64], scratch: &mut Vec<us
     if scratch.is_empty() { 0 } else { first }
 }
 
-/// How far `row` is from `mean` along `direction`.
+/// Returns the distance of `row` from `mean` along `direction`.
 fn along(row: &[f32], mean: &[f32], direction: &[f32]) -> f32 {
     let mut sums = [0.0_f32; super::palette::LANES];
     let lanes = row.as_chunks().0.iter().zip(mean.as_chunks().0).zip(direction.as_chunks().0);

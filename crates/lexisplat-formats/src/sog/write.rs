@@ -12,9 +12,9 @@ use super::{ENTRIES_PER_ROW, LEVELS, META, MOST_ENTRIES, archive, meta::VERSION}
 use crate::opacity::{sigmoid, to_byte};
 use crate::write::{Lost, WriteOptions};
 
-/// Sides of pictures are multiples of this (`write-sog.ts`).
+/// Factor of the sides of pictures (`write-sog.ts`).
 const SIDE_STEP: usize = 4;
-/// Bits of a Gaussian's position along each axis.
+/// Number of bits of a Gaussian's position along each axis.
 const POSITION_BITS: u32 = 16;
 /// Largest byte.
 const OPAQUE: u8 = u8::MAX;
@@ -122,25 +122,27 @@ pub(crate) fn write(
     Ok((archive::write(&members)?, lost))
 }
 
-/// The width and height of pictures with a pixel for each of `n` Gaussians.
+/// Returns the width and height of pictures with a pixel for each of `n` Gaussians.
 fn sides(n: usize) -> (usize, usize) {
     let root = n.isqrt() + usize::from(n.isqrt().pow(2) < n);
     let width = root.next_multiple_of(SIDE_STEP).max(SIDE_STEP);
     (width, n.div_ceil(width).next_multiple_of(SIDE_STEP).max(SIDE_STEP))
 }
 
-/// The least and largest of `values`, as logarithms.
+/// Returns the smallest and the largest of `values`, as logarithms.
 fn ends(values: impl Iterator<Item = f32>) -> [f64; 2] {
     let ends = values.fold([f32::INFINITY, f32::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
     if ends[0] <= ends[1] { ends.map(|v| to_log(v.into())) } else { [0.0; 2] }
 }
 
-/// Values of single precision, as short as they come back.
+/// Returns values of single precision as JSON. Each is written with the fewest digits that give the same value when it is
+/// read.
 fn list(values: &[f32; LEVELS]) -> Value {
     values.iter().map(|v| json!(v)).collect()
 }
 
-/// Gaussians by the Morton code of all bits of their positions. Those of equal codes keep their order.
+/// Returns Gaussians in the order of the Morton codes of all bits of their positions. Gaussians of equal codes keep their
+/// order.
 fn order(codes: &[[u16; 3]]) -> Vec<usize> {
     let spread = |[x, y, z]: [u16; 3]| -> u64 {
         (0..POSITION_BITS).fold(0, |code, bit| {
@@ -157,16 +159,16 @@ fn order(codes: &[[u16; 3]]) -> Vec<usize> {
 /// SH as a palette.
 struct Sh {
     entries: usize,
-    /// The entry of each Gaussian, in the order of the file.
+    /// Index of the entry of each Gaussian, in the order of the file.
     labels: Vec<u32>,
-    /// The picture of the palette, whose last row is filled up.
+    /// Picture of the palette. Its last row is padded.
     pixels: Vec<[u8; 4]>,
-    /// What its bytes stand for.
+    /// Values of its bytes.
     values: [f32; LEVELS],
 }
 
 impl Sh {
-    /// The SH up to `degree` of `splats` in this order, in at most `most` entries.
+    /// Returns the SH of `splats` up to `degree`, in this order, as at most `most` entries.
     fn new(
         splats: &Splats,
         degree: ShDegree,
@@ -184,7 +186,7 @@ impl Sh {
             }
             rows.resize(rows.len().next_multiple_of(width), 0.0);
         }
-        // The largest power of two that is no more than there are Gaussians (`write-sog.ts`).
+        // The largest power of two that does not exceed the number of Gaussians (`write-sog.ts`).
         let most = most.min(1 << order.len().max(1).ilog2());
         let found = palette(Rows { values: &rows, width }, most, progress)?;
         let entries = found.entries.len() / width;

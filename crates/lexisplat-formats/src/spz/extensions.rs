@@ -1,19 +1,19 @@
-//! Records of extensions: a type, a length, and so many bytes (nianticlabs/spz, `extensions/README.md`).
+//! Records of extensions: a type, a length, and as many bytes as the length (nianticlabs/spz, `extensions/README.md`).
 
 use lexisplat::{Error, Result};
 
 use crate::axes::Flip;
 use crate::numbers::u32_at;
 
-/// Bytes of a record's type and length.
+/// Number of bytes of a record's type and length.
 const HEAD: usize = 8;
 /// Type of the record that names the axes (`SPZ_ADOBE_coordinate_system`, `coordinate-system-adobe.h`).
 const COORDINATES: u32 = 0xADBE_0003;
-/// The axes by number, from 1 on, as they differ from those of a PLY (right, down, front), numbers 1 to 8 of
-/// `CoordinateSystem` in `splat-types.h`: bit 0 of the number less 1 is right, bit 1 up, bit 2 front.
+/// Numbers of coordinate systems: 1 to 8 of `CoordinateSystem` in `splat-types.h`. They differ from the axes of a PLY
+/// (right, down, front). In the number less 1, bit 0 is right, bit 1 is up, and bit 2 is front.
 const AXES: std::ops::RangeInclusive<u32> = 1..=8;
 
-/// What the records say.
+/// The contents of the records.
 #[derive(Debug, PartialEq)]
 pub(super) struct Extensions {
     pub(super) flip: Flip,
@@ -45,7 +45,7 @@ impl Extensions {
             found.count += 1;
             let axes = u32_at(payload, 0);
             match kind {
-                // 0 is not specified.
+                // 0 means that the axes are not specified.
                 COORDINATES if length >= 4 && axes == 0 => {}
                 COORDINATES if length >= 4 && AXES.contains(&axes) => {
                     let [right, up, front] = [0, 1, 2].map(|bit| (axes - 1) >> bit & 1 == 1);

@@ -1,4 +1,4 @@
-//! What an SPZ begins with, and how long its parts are.
+//! The header of an SPZ, and the lengths of its parts.
 
 use lexisplat::{Error, FormatError, Result, ShDegree};
 
@@ -6,25 +6,25 @@ use crate::numbers::u32_at;
 
 /// First bytes of a header, in all versions.
 const MAGIC: &[u8; 4] = b"NGSP";
-/// Bytes of a header of versions 1 to 3, which is inside gzip (`LegacyPackedGaussiansHeader`).
+/// Number of bytes of a header of versions 1 to 3, which is inside gzip (`LegacyPackedGaussiansHeader`).
 pub(super) const OLD_BYTES: usize = 16;
-/// Bytes of a header of version 4 (`NgspFileHeader`).
+/// Number of bytes of a header of version 4 (`NgspFileHeader`).
 pub(super) const BYTES: usize = 32;
-/// The first version outside of gzip.
+/// First version that is not inside gzip.
 pub(super) const FIRST_ZSTD: u32 = 4;
-/// The newest version.
+/// Newest version.
 pub(super) const NEWEST: u32 = 4;
-/// The first version whose rotations are three of four components (`MIN_SMALLEST_THREE_QUATERNIONS_VERSION`).
+/// First version whose rotations are the smallest three of four components (`MIN_SMALLEST_THREE_QUATERNIONS_VERSION`).
 const FIRST_SMALLEST_THREE: u32 = 3;
-/// Flag: trained with anti-aliasing.
+/// Flag of scenes that were trained with anti-aliasing.
 const ANTIALIASED: u8 = 1;
-/// Flag: records of extensions follow.
+/// Flag of files with records of extensions.
 const EXTENSIONS: u8 = 2;
-/// Most bits of the fraction of a position, which has 24 bits in all.
+/// Largest number of bits of the fraction of a position, which has 24 bits in all.
 const MOST_FRACTION: u8 = 24;
-/// Streams of values.
+/// Number of streams of values.
 pub(super) const STREAMS: usize = 6;
-/// Their names, in the order of the file.
+/// Names of the streams, in the order of the file.
 pub(super) const NAMES: [&str; STREAMS] = ["positions", "alphas", "colors", "scales", "rotations", "sh"];
 
 /// A header of any version (nianticlabs/spz, `load-spz.cc`).
@@ -34,16 +34,16 @@ pub(super) struct Header {
     /// Number of Gaussians.
     pub(super) count: u32,
     pub(super) degree: ShDegree,
-    /// Bits of the fraction of a position.
+    /// Number of bits of the fraction of a position.
     pub(super) fraction: u8,
     pub(super) antialiased: bool,
     pub(super) has_extensions: bool,
-    /// Number of streams that are not empty, and where their table begins; only in version 4.
+    /// Number of streams that are not empty, and the place of their table; only in version 4.
     pub(super) table: Option<(usize, usize)>,
 }
 
 impl Header {
-    /// The header in `bytes` of the file called `name`: 16 bytes that were inside gzip, or 32.
+    /// Parses the header in `bytes` of the file called `name`: 16 bytes that were inside gzip, or 32 bytes.
     pub(super) fn parse(name: &str, bytes: &[u8]) -> Result<Self> {
         let malformed = |text: String| Error::malformed(name, text);
         let gzipped = bytes.len() == OLD_BYTES;
@@ -77,30 +77,30 @@ impl Header {
         })
     }
 
-    /// The header as bytes.
+    /// Returns the header as bytes.
     pub(super) fn to_bytes(self) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(self.version.to_le_bytes());
         bytes.extend(self.count.to_le_bytes());
         let flags = u8::from(self.antialiased) * ANTIALIASED;
-        // At most 6 streams.
+        // There are at most 6 streams.
         let streams = self.table.map_or(0, |(streams, _)| streams.to_le_bytes()[0]);
         bytes.extend([self.degree.get(), self.fraction, flags, streams]);
         if self.table.is_some() {
-            // No extensions are written, so the table comes at once.
+            // No extensions are written, so the table follows the header.
             bytes.extend((BYTES as u64).to_le_bytes());
             bytes.resize(BYTES, 0);
         }
         bytes
     }
 
-    /// Bytes that a Gaussian has in each stream.
+    /// Returns the number of bytes of a Gaussian in each stream.
     pub(super) fn widths(self) -> [usize; STREAMS] {
         let position = if self.version == 1 { 3 * 2 } else { 3 * 3 };
         [position, 1, 3, 3, if self.has_smallest_three() { 4 } else { 3 }, self.degree.rest()]
     }
 
-    /// Whether rotations are the smallest three components and not the first three.
+    /// Returns whether rotations are the smallest three components. Otherwise they are the first three.
     pub(super) fn has_smallest_three(self) -> bool {
         self.version >= FIRST_SMALLEST_THREE
     }

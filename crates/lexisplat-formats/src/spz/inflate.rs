@@ -1,4 +1,4 @@
-//! gzip and Zstandard, within sizes that are known before.
+//! gzip and Zstandard, with sizes that are known in advance.
 
 use std::io::{self, Read, Write};
 
@@ -7,12 +7,12 @@ use flate2::bufread::GzDecoder;
 use flate2::write::GzEncoder;
 use lexisplat::{Error, FormatError, Result};
 
-/// Effort of deflate, 0 to 9 (`Z_DEFAULT_COMPRESSION` of the reference).
+/// Compression level of deflate, 0 to 9 (`Z_DEFAULT_COMPRESSION` of the reference).
 const DEFLATE_LEVEL: u32 = 6;
-/// Effort of Zstandard (`compressZstd` of the reference).
+/// Compression level of Zstandard (`compressZstd` of the reference).
 const ZSTD_LEVEL: i32 = 12;
 
-/// The bytes inside a gzip file, or of a file that should be inside of one.
+/// Reads the bytes inside a gzip file, or the bytes of a file that was inflated before.
 pub(super) struct Gunzip<'a> {
     name: &'a str,
     decoder: Box<dyn Read + 'a>,
@@ -23,12 +23,12 @@ impl<'a> Gunzip<'a> {
         Self { name, decoder: Box::new(GzDecoder::new(bytes)) }
     }
 
-    /// `bytes` as they are.
+    /// Returns a reader of `bytes` without inflating.
     pub(super) fn plain(name: &'a str, bytes: &'a [u8]) -> Self {
         Self { name, decoder: Box::new(bytes) }
     }
 
-    /// Fills `out`, which is for `what`.
+    /// Fills `out` with bytes. Errors call them `what`.
     pub(super) fn fill(&mut self, what: &str, out: &mut [u8]) -> Result<()> {
         let mut done = 0;
         while done < out.len() {
@@ -45,7 +45,7 @@ impl<'a> Gunzip<'a> {
         Ok(())
     }
 
-    /// All that is left, at most `most` bytes.
+    /// Returns all remaining bytes, at most `most`.
     pub(super) fn rest(mut self, what: &str, most: u64) -> Result<Vec<u8>> {
         let mut rest = Vec::new();
         let read = (&mut self.decoder).take(most.saturating_add(1)).read_to_end(&mut rest);
@@ -61,7 +61,7 @@ impl<'a> Gunzip<'a> {
     }
 }
 
-/// `bytes` as a gzip file without a name and a time.
+/// Returns `parts` as a gzip file without a name and a time.
 pub(super) fn gzip(parts: &[&[u8]]) -> Result<Vec<u8>> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::new(DEFLATE_LEVEL));
     for part in parts {
@@ -70,7 +70,7 @@ pub(super) fn gzip(parts: &[&[u8]]) -> Result<Vec<u8>> {
     encoder.finish().map_err(|source| Error::Writer { source })
 }
 
-/// Fills `out` with what the Zstandard frame `bytes` holds, exactly.
+/// Fills `out` with the contents of the Zstandard frame `bytes`, which must have exactly this length.
 pub(super) fn unzstd(name: &str, what: &str, bytes: &[u8], out: &mut [u8]) -> Result<()> {
     let damaged =
         |error: String| Error::malformed(name, format!("{what}: the Zstandard frame is damaged: {error}"));
@@ -88,7 +88,7 @@ pub(super) fn unzstd(name: &str, what: &str, bytes: &[u8], out: &mut [u8]) -> Re
     Err(Error::format(name, problem))
 }
 
-/// `bytes` as a Zstandard frame.
+/// Returns `bytes` as a Zstandard frame.
 pub(super) fn zstd(bytes: &[u8]) -> Result<Vec<u8>> {
     #[cfg(feature = "zstd")]
     return zstd::bulk::compress(bytes, ZSTD_LEVEL).map_err(|source| Error::Writer { source });

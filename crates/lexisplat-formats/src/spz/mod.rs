@@ -1,9 +1,10 @@
 //! SPZ, versions 1 to 4 (nianticlabs/spz, `load-spz.cc`).
 //!
-//! Values are 6 streams of bytes: positions of 24 bits with a fixed point, opacities, colours and logarithms of scales of 8
-//! bits, rotations of 24 or 32 bits, SH of 8 bits, coefficient by coefficient with the colour inside. In versions 1 to 3 one
-//! gzip stream holds a header and all of them, and what was inflated already is read too; in version 4 each is a Zstandard frame. Axes are x right, y up, z back,
-//! unless an extension names others.
+//! Values are in 6 streams of bytes. Positions have 24 bits with a fixed point. Opacities, colours and logarithms of
+//! scales have 8 bits. Rotations have 24 or 32 bits. SH have 8 bits, coefficient by coefficient, with the channels of a
+//! coefficient side by side. In versions 1 to 3 one gzip stream holds a header and all streams; files that were inflated
+//! before are read too. In version 4 each stream is a Zstandard frame. The axes are x right, y up, z back, unless an
+//! extension states others.
 
 mod extensions;
 mod header;
@@ -29,16 +30,17 @@ use crate::rows::{Described, Rows, RowsMut};
 
 pub(crate) use self::write::write;
 
-/// Base colours are 0.5 and this times SH coefficient 0, so that colours outside of 0 to 1 fit too (`colorScale`).
+/// Factor of stored base colours: they are `0.5 + 0.15 * SH coefficient 0`, so that colours outside of 0 to 1 fit too
+/// (`colorScale`).
 const COLOUR_SCALE: f32 = 0.15;
-/// Steps of the logarithm of a scale, for a unit; and the logarithm that 0 stands for.
+/// Number of steps in a unit of the logarithm of a scale, and the logarithm for the byte 0.
 const SCALE_STEPS: f32 = 16.0;
 const SCALE_LEAST: f32 = -10.0;
-/// Stands for 0 in SH, and for 1 above it (`unquantizeSH`).
+/// Byte of SH that means 0; 128 more means 1 (`unquantizeSH`).
 const SH_ZERO: f32 = 128.0;
-/// Bytes of an entry of the table of streams: lengths before and after inflating.
+/// Number of bytes of an entry of the table of streams: the lengths before and after inflating.
 const ENTRY: usize = 16;
-/// Where the version is in a header.
+/// Place of the version in a header.
 const VERSION_AT: usize = 4;
 /// First bytes of gzip.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
@@ -78,7 +80,7 @@ pub(crate) fn read(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<De
 /// A header, the inflated streams, and the records of extensions.
 type Parts = (Header, [Vec<u8>; STREAMS], Vec<u8>);
 
-/// Empty streams for the Gaussians of `header`, if the limits allow them.
+/// Returns zeroed streams for the Gaussians of `header`, if the limits allow them.
 fn room(name: &str, file_bytes: usize, header: Header, options: &ReadOptions) -> Result<[Vec<u8>; STREAMS]> {
     options.limits.check_gaussians(name, header.count.into())?;
     let (count, widths) = (header.count as usize, header.widths());
@@ -86,7 +88,7 @@ fn room(name: &str, file_bytes: usize, header: Header, options: &ReadOptions) ->
     Ok(widths.map(|width| vec![0; count * width]))
 }
 
-/// The parts of a file of version 1 to 3.
+/// Reads the parts of a file of version 1 to 3.
 fn old(name: &str, file_bytes: usize, mut gunzip: Gunzip<'_>, options: &ReadOptions) -> Result<Parts> {
     let mut head = [0; OLD_BYTES];
     gunzip.fill("the header", &mut head)?;
@@ -95,12 +97,12 @@ fn old(name: &str, file_bytes: usize, mut gunzip: Gunzip<'_>, options: &ReadOpti
     for (stream, what) in streams.iter_mut().zip(NAMES) {
         gunzip.fill(what, stream)?;
     }
-    // The end of the stream has its checksum.
+    // The checksum is at the end of the gzip stream, so the stream is read to its end.
     let records = gunzip.rest("extensions", options.limits.header_bytes)?;
     Ok((header, streams, records))
 }
 
-/// The parts of a file of version 4.
+/// Reads the parts of a file of version 4.
 fn new(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Parts> {
     let header = Header::parse(name, bytes)?;
     let (count, table) = header.table.unwrap_or_default();
@@ -119,7 +121,7 @@ fn new(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Parts> {
     })?;
     let mut entries = entries.as_chunks::<ENTRY>().0.iter();
     let mut streams = room(name, bytes.len(), header, options)?;
-    // Streams without bytes have no entry.
+    // Streams without bytes have no entry in the table.
     for (stream, what) in streams.iter_mut().zip(NAMES).filter(|(stream, _)| !stream.is_empty()) {
         let Some(entry) = entries.next() else {
             return Err(malformed(format!("{count} streams, and none for {what}")));
@@ -151,14 +153,14 @@ struct SpzRows {
 }
 
 impl SpzRows {
-    /// The bytes of Gaussians `range` in stream number `k`.
+    /// Returns the bytes of Gaussians `range` in stream number `k`.
     fn bytes(&self, k: usize, range: &Range<usize>) -> &[u8] {
         let width = self.header.widths()[k];
         &self.streams[k][range.start * width..range.end * width]
     }
 }
 
-/// All values that 8 bits stand for.
+/// Returns the values of all 8-bit codes.
 fn table(value: impl Fn(f32) -> f32) -> [f32; 256] {
     std::array::from_fn(|k| value(k as f32))
 }
@@ -175,7 +177,7 @@ impl Rows for SpzRows {
         } else {
             let unit = 1.0 / (1_u32 << self.header.fraction) as f32;
             for (position, row) in out.positions.iter_mut().zip(bytes(0).as_chunks::<9>().0) {
-                // The top byte brings the sign along.
+                // The top byte has the sign.
                 let fixed = |k: usize| i32::from_le_bytes([0, row[k], row[k + 1], row[k + 2]]) >> 8;
                 *position = self.flip.position([0, 3, 6].map(|k| fixed(k) as f32 * unit));
             }
@@ -210,7 +212,7 @@ impl Rows for SpzRows {
     }
 }
 
-/// Decodes SH of one Gaussian: from coefficient by coefficient to channel by channel.
+/// Decodes the SH of one Gaussian: changes the order from coefficient by coefficient to channel by channel.
 fn spread(rest: &mut [f32], row: &[u8], per: usize, factors: &[f32; MAX_COEFFICIENTS - 1]) {
     let (red, others) = rest.split_at_mut(per);
     let (green, blue) = others.split_at_mut(per);

@@ -1,28 +1,28 @@
 //! Rotations in 32 and in 24 bits.
 //!
-//! Rounding may change which component is the largest. Encoders here go on encoding what a decoder gives until that changes
-//! nothing, so what is read and written again has the same bits.
+//! Rounding may change which component is the largest. The encoders therefore encode the decoded rotation again until the
+//! code does not change. A rotation that is read and written again then has the same bits.
 
 use crate::settle::settled;
 
-/// Bits of a component's magnitude.
+/// Number of bits of a component's magnitude.
 const BITS: u32 = 9;
 const MASK: u32 = (1 << BITS) - 1;
-/// Largest value of a component that is not the largest.
+/// Largest magnitude of a component that is not the largest.
 const LARGEST: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Half of the range of 8 bits, for components from -1 to 1.
 const HALF: f32 = 127.5;
 
 #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
-/// A rotation (w, x, y, z) of length 1, as (x, y, z, w). One of length 0 stands for none.
+/// Returns a rotation (w, x, y, z) scaled to length 1, as (x, y, z, w). A rotation of length 0 becomes no rotation.
 fn unit([w, x, y, z]: [f32; 4]) -> [f32; 4] {
     let wide = [x, y, z, w].map(f64::from);
     let length = wide.iter().map(|v| v * v).sum::<f64>().sqrt();
     if length > 0.0 { wide.map(|v| (v / length) as f32) } else { [0.0, 0.0, 0.0, 1.0] }
 }
 
-/// The rotation (w, x, y, z) of 32 bits: 2 for the place of the largest component among (x, y, z, w), then sign and magnitude
-/// of the others (`packQuaternionSmallestThree`).
+/// Returns the rotation (w, x, y, z) of 32 bits: 2 bits for the place of the largest component among (x, y, z, w), then
+/// sign and magnitude of the others (`packQuaternionSmallestThree`).
 pub(super) fn smallest_three(code: u32) -> [f32; 4] {
     let place = (code >> (3 * (BITS + 1))) as usize;
     let mut parts = [0.0; 4];
@@ -38,7 +38,7 @@ pub(super) fn smallest_three(code: u32) -> [f32; 4] {
     [w, x, y, z]
 }
 
-/// The nearest code of a rotation (w, x, y, z), whose decoding has the same code.
+/// Returns the nearest code of a rotation (w, x, y, z). The decoded rotation has the same code again.
 pub(super) fn to_smallest_three(rotation: [f32; 4]) -> u32 {
     settled(once(rotation), |code| once(smallest_three(code)))
 }
@@ -56,20 +56,21 @@ fn once(rotation: [f32; 4]) -> u32 {
     let mut code = place as u32;
     for k in (0..4).filter(|k| *k != place) {
         let size = (parts[k].abs() / LARGEST * MASK as f32).round().min(MASK as f32) as u32;
-        // Zero has one sign.
+        // A component of 0 has no negative sign.
         let negative = size > 0 && (parts[k] < 0.0) != negate;
         code = code << (BITS + 1) | u32::from(negative) << BITS | size;
     }
     code
 }
 
-/// The rotation (w, x, y, z) of 24 bits: x, y and z beside a w that is not negative (`unpackQuaternionFirstThree`).
+/// Returns the rotation (w, x, y, z) of 24 bits: x, y and z. The component w is not negative and follows from them
+/// (`unpackQuaternionFirstThree`).
 pub(super) fn first_three(code: [u8; 3]) -> [f32; 4] {
     let [x, y, z] = code.map(|v| f32::from(v) / HALF - 1.0);
     [(1.0 - (x * x + y * y + z * z)).max(0.0).sqrt(), x, y, z]
 }
 
-/// The nearest code of a rotation (w, x, y, z), whose decoding has the same code.
+/// Returns the nearest code of a rotation (w, x, y, z). The decoded rotation has the same code again.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to 8 bits")]
 pub(super) fn to_first_three(rotation: [f32; 4]) -> [u8; 3] {
     let once = |rotation: [f32; 4]| {

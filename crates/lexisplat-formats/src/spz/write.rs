@@ -10,21 +10,21 @@ use crate::axes::Flip;
 use crate::opacity::{MOST, sigmoid, to_byte};
 use crate::write::{Lost, WriteOptions};
 
-/// Bits of the fraction of positions of scenes that are small enough for it (`packGaussians`).
+/// Number of bits of the fraction of positions, if the scene is small enough (`packGaussians`).
 const FRACTION: u8 = 12;
-/// Largest position in units of its last bit, of 24 bits in all.
+/// Largest position in units of its last bit. A position has 24 bits in all.
 const MOST_FIXED: f32 = 8_388_607.0;
-/// Versions that can be written.
+/// Versions of SPZ that can be written.
 const VERSIONS: std::ops::RangeInclusive<u8> = 2..=4;
-/// Bits of an SH coefficient.
+/// Numbers of bits of an SH coefficient that can be chosen.
 const SH_BITS: std::ops::RangeInclusive<u8> = 1..=8;
-/// SH coefficients of degree 1, of one channel.
+/// Number of SH coefficients of degree 1, of one channel.
 const DEGREE_ONE: usize = 3;
 
 /// Writes `splats` as an SPZ.
 ///
 /// # Errors
-/// [`Error::Parameter`] for options out of range, [`Error::Limit`] for more Gaussians than 32 bits count.
+/// [`Error::Parameter`] for options out of range, [`Error::Limit`] for more Gaussians than 32 bits can count.
 pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>, Lost)> {
     if !VERSIONS.contains(&options.spz_version) {
         return Err(Error::parameter("spz_version", options.spz_version, "2, 3 or 4"));
@@ -77,13 +77,13 @@ pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>,
     Ok((bytes, lost))
 }
 
-/// Bits of the fraction with which all positions fit into 24 bits, at most [`FRACTION`].
+/// Returns the number of bits of the fraction with which all positions fit into 24 bits, at most [`FRACTION`].
 fn fraction(splats: &Splats) -> u8 {
     let most = splats.geometry.positions.as_flattened().iter().fold(0.0_f32, |most, v| most.max(v.abs()));
     (0..=FRACTION).rev().find(|bits| most * (1_u32 << bits) as f32 <= MOST_FIXED).unwrap_or(0)
 }
 
-/// A sentence if positions are so far from the origin that their steps are coarse.
+/// Returns a sentence if positions are so far from the origin that their steps are coarse.
 fn coarse(splats: &Splats, fraction: u8) -> Option<String> {
     if fraction == FRACTION {
         return None;
@@ -95,7 +95,7 @@ fn coarse(splats: &Splats, fraction: u8) -> Option<String> {
     Some(format!("{said}; --translate brings the scene to the origin"))
 }
 
-/// The bytes of all values. Adds how many were out of range.
+/// Returns the bytes of all values. Adds the number of values that are out of range to `limited`.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited before")]
 fn streams(splats: &Splats, header: Header, sh_bits: [u8; 2], limited: &mut u64) -> [Vec<u8>; STREAMS] {
     let geometry = &splats.geometry;
@@ -147,7 +147,7 @@ fn streams(splats: &Splats, header: Header, sh_bits: [u8; 2], limited: &mut u64)
     [positions, alphas, colours, scales, rotations, sh]
 }
 
-/// The middle of the bucket of `value` of which `bits` bits are kept; 128 is the middle of one (`quantizeSH`).
+/// Returns the middle of the bucket of `value`, if `bits` bits are kept. 128 is the middle of a bucket (`quantizeSH`).
 fn to_bucket(value: u8, bits: u8) -> u8 {
     let size = 1_u16 << (8 - bits);
     ((u16::from(value) + size / 2) / size * size).min(255) as u8

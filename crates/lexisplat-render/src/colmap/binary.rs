@@ -7,11 +7,11 @@ use super::intrinsics::{Cameras, Intrinsics, Pinhole};
 use super::pose::Posed;
 use crate::error::Result;
 
-/// Least bytes of a camera: number, model, width, height and three parameters.
+/// Smallest number of bytes of a camera: number, model, width, height and three parameters.
 const CAMERA_BYTES: u64 = 4 + 4 + 8 + 8 + 3 * 8;
-/// Least bytes of an image: number, pose, camera, the end of an empty name, number of points.
+/// Smallest number of bytes of an image: number, pose, camera, the end of an empty name, and number of points.
 const IMAGE_BYTES: u64 = 4 + 7 * 8 + 4 + 1 + 8;
-/// Bytes of a point of an image: x, y, and the number of the point it shows.
+/// Number of bytes of a point of an image: x, y, and the number of the 3D point.
 const POINT_BYTES: u64 = 3 * 8;
 
 pub(super) fn cameras<R: BufRead + Seek>(mut reader: BinaryReader<'_, R>) -> Result<Cameras> {

@@ -1,4 +1,4 @@
-//! Reads a binary file from front to back. A count in it is checked against the bytes that follow.
+//! Reads a binary file from front to back. Each count in the file is checked against the number of bytes that follow it.
 
 use std::fmt::{Arguments, Display};
 use std::io::{BufRead, ErrorKind, Seek};
@@ -54,7 +54,7 @@ impl<'a, R: BufRead + Seek> BinaryReader<'a, R> {
         Ok(values)
     }
 
-    /// Reads the number of entries that follow, of at least `least` bytes each.
+    /// Reads the number of entries that follow. Each entry takes at least `least` bytes.
     pub(super) fn count(&mut self, what: &str, least: u64) -> Result<u64> {
         let count = self.u64(format_args!("number of {what}"))?;
         if count > self.left / least {
@@ -95,7 +95,7 @@ impl<'a, R: BufRead + Seek> BinaryReader<'a, R> {
         })
     }
 
-    /// Checks that nothing follows.
+    /// Checks that no bytes follow.
     pub(super) fn end(&self, what: &str) -> Result<()> {
         if self.left > 0 {
             return Err(self.wrong(what, format!("{} bytes follow the last one", self.left)));

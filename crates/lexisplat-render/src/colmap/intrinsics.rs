@@ -27,14 +27,14 @@ const MODELS: [&str; 12] = [
 /// A model without distortion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pinhole {
-    /// One focal length: f, cx, cy.
+    /// A model with one focal length: f, cx, cy.
     Simple,
-    /// Two: fx, fy, cx, cy.
+    /// A model with two focal lengths: fx, fy, cx, cy.
     Two,
 }
 
 impl Pinhole {
-    /// Returns the model of this name. The error for another model says what to do.
+    /// Returns the model of this name. The error for an unsupported model gives advice.
     pub(super) fn named(name: &str) -> Result<Self, String> {
         match name {
             "SIMPLE_PINHOLE" => Ok(Self::Simple),
@@ -52,7 +52,7 @@ impl Pinhole {
     }
 }
 
-/// Size in pixels, focal lengths and principal point in pixels.
+/// Size, focal lengths and principal point of a camera, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Intrinsics {
     pub(super) width: u32,
@@ -62,7 +62,7 @@ pub(super) struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// Checks the ranges that a camera has.
+    /// Returns the intrinsics, or an error if a value is out of range.
     pub(super) fn new(width: u64, height: u64, focal: [f64; 2], centre: [f64; 2]) -> Result<Self, String> {
         let side = |name: &str, value: u64| match u32::try_from(value) {
             Ok(side) if (1..=MAX_SIDE).contains(&side) => Ok(side),

@@ -1,18 +1,18 @@
-//! Reads the lines of a text file. Of a long line no more than a limit is held in memory.
+//! Reads the lines of a text file. The memory held for a line is limited, however long the line is.
 
 use std::fmt::Display;
 use std::io::{BufRead, Read};
 
 use crate::error::{Error, Result};
 
-/// Longest line that is read as text, in bytes. A name at its limit and ten numbers fit.
+/// Longest line that is read as text, in bytes. It has room for the longest name and ten numbers.
 const MAX_LINE: usize = 4096;
 
 /// Lines of a reader.
 pub(super) struct Lines<'a, R> {
     file: &'a str,
     reader: R,
-    /// Number of the line read last, from 1.
+    /// Number of the last line read, from 1.
     number: u64,
     bytes: Vec<u8>,
 }
@@ -22,7 +22,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
         Self { file, reader, number: 0, bytes: Vec::new() }
     }
 
-    /// Returns an error about the line read last.
+    /// Returns an error about the last line read.
     pub(super) fn wrong(&self, problem: impl Display) -> Error {
         Error::format(self.file, format!("line {}: {problem}", self.number))
     }
@@ -32,7 +32,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
         Error::limit(format!("{}: {what}", self.file), limit as u64 + 1, limit as u64)
     }
 
-    /// Reads the next line, without white space at its ends; `None` after the last.
+    /// Reads the next line, without white space at its ends; `None` after the last line.
     pub(super) fn line(&mut self) -> Result<Option<String>> {
         if !self.read_piece(MAX_LINE + 1)? {
             return Ok(None);
@@ -66,7 +66,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
         Ok(words)
     }
 
-    /// Reads at most `most` bytes of what is left of a line, and its end. Returns whether there was any.
+    /// Reads at most `most` bytes of the rest of a line, and the end of the line. Returns whether there were any bytes.
     fn read_piece(&mut self, most: usize) -> Result<bool> {
         self.bytes.clear();
         let mut piece = self.reader.by_ref().take(most as u64);

@@ -1,8 +1,8 @@
-//! Reads COLMAP models: `cameras.bin` and `images.bin`, or the same as text.
+//! Reads COLMAP models: `cameras.bin` and `images.bin`, or the same files as text.
 //!
-//! The rasteriser can draw only from the cameras `PINHOLE` and `SIMPLE_PINHOLE`; COLMAP's `image_undistorter`
-//! makes such ones. Points are never read. The principal point is ignored, as the 3DGS authors' loader does
-//! (`gaussian-splatting/scene/dataset_readers.py`, `readColmapCameras`). Models trained with that loader are so
+//! The rasteriser can draw only from cameras of the models `PINHOLE` and `SIMPLE_PINHOLE`, which COLMAP's
+//! `image_undistorter` makes. Points are never read. The principal point is ignored, as in the 3DGS authors' loader
+//! (`gaussian-splatting/scene/dataset_readers.py`, `readColmapCameras`). Models trained with that loader are therefore
 //! drawn as they were trained; see [`ViewSet::warnings`].
 //!
 //! Formats: COLMAP's documentation, "Output Format", and `src/colmap/scene/reconstruction_io.cc`.
@@ -27,10 +27,10 @@ use intrinsics::Cameras;
 use lines::Lines;
 use pose::Posed;
 
-/// Largest file read, in bytes. `images.bin` holds every keypoint: 24 bytes each, some 10,000 a photo.
+/// Largest file read, in bytes. `images.bin` holds every keypoint: 24 bytes each, and about 10,000 for each photo.
 pub const MAX_COLMAP_BYTES: u64 = 4 << 30;
-/// Where a model may lie in the folder given: the folder itself, COLMAP's own layout, that of INRIA's
-/// `convert.py`, and nerfstudio's.
+/// Places of a model in the given folder: the folder itself, COLMAP's own layout, the layout of INRIA's `convert.py`, and
+/// nerfstudio's layout.
 const PLACES: [&str; 4] = ["", "sparse/0/", "sparse/", "colmap/sparse/0/"];
 
 /// The names of the two files of a model.
@@ -40,8 +40,8 @@ pub(crate) struct ModelFiles {
     images: String,
 }
 
-/// Returns the model among `files`: that of the first place that has one, and the binary one if the place has
-/// both kinds.
+/// Finds the model among `files`: the model in the first of the [`PLACES`] that has one. A place with both kinds gives
+/// the binary model.
 pub(crate) fn find<F: ViewFiles + ?Sized>(files: &F) -> Option<ModelFiles> {
     PLACES.iter().find_map(|place| {
         [(true, "bin"), (false, "txt")].into_iter().find_map(|(binary, end)| {
@@ -51,12 +51,12 @@ pub(crate) fn find<F: ViewFiles + ?Sized>(files: &F) -> Option<ModelFiles> {
     })
 }
 
-/// Reads a model among `files`. Cameras are in order of their names, which are the photos' names as written,
-/// with folders and extension; no split is set.
+/// Reads a model among `files`. Cameras are in the order of their names. These are the names of the photos as written,
+/// with folders and extension. No split is set.
 ///
 /// # Errors
-/// [`lexisplat::Error::Io`] if a file cannot be read; [`lexisplat::Error::Limit`] if it is over [`MAX_COLMAP_BYTES`]; otherwise as
-/// [`read_colmap_binary`].
+/// [`lexisplat::Error::Io`] if a file cannot be read; [`lexisplat::Error::Limit`] if a file is over [`MAX_COLMAP_BYTES`];
+/// otherwise as [`read_colmap_binary`].
 pub(crate) fn read<F: ViewFiles + ?Sized>(files: &F, model: &ModelFiles) -> Result<ViewSet> {
     let open = |file: &str| {
         let file = files.open(file)?;
@@ -69,22 +69,21 @@ pub(crate) fn read<F: ViewFiles + ?Sized>(files: &F, model: &ModelFiles) -> Resu
     join(model.binary, open(&model.cameras)?, open(&model.images)?)
 }
 
-/// Returns the views of the bytes of a `cameras.bin` and an `images.bin`. `name` stands for their folder in
-/// errors.
+/// Returns the views in the bytes of a `cameras.bin` and an `images.bin`. Errors call their folder `name`.
 ///
 /// # Errors
 /// [`lexisplat::Error::Format`] naming the file, the image or camera and the value, for: bytes that are cut off, a count
-/// that the bytes cannot hold, a model other than `PINHOLE` and `SIMPLE_PINHOLE`, an image whose camera is
-/// missing, numbers that are not a pose. [`lexisplat::Error::Limit`] if there are over [`crate::MAX_CAMERAS`].
+/// that the bytes cannot hold, a model other than `PINHOLE` and `SIMPLE_PINHOLE`, an image whose camera is missing, and
+/// numbers that are not a pose. [`lexisplat::Error::Limit`] for more than [`crate::MAX_CAMERAS`] cameras.
 pub fn read_colmap_binary(name: &str, cameras: &[u8], images: &[u8]) -> Result<ViewSet> {
     let file = |file, bytes| ViewFile::from_bytes(within(name, file), bytes);
     join(true, file("cameras.bin", cameras), file("images.bin", images))
 }
 
-/// Returns the views of the bytes of a `cameras.txt` and an `images.txt`, as [`read_colmap_binary`] does.
+/// Returns the views in the bytes of a `cameras.txt` and an `images.txt`, like [`read_colmap_binary`].
 ///
 /// # Errors
-/// As [`read_colmap_binary`]; a text that ends early is an error only where a line is cut.
+/// As [`read_colmap_binary`]. A text that ends early is an error only if a line is cut.
 pub fn read_colmap_text(name: &str, cameras: &[u8], images: &[u8]) -> Result<ViewSet> {
     let file = |file, bytes| ViewFile::from_bytes(within(name, file), bytes);
     join(false, file("cameras.txt", cameras), file("images.txt", images))

@@ -6,7 +6,7 @@ use super::intrinsics::Intrinsics;
 use crate::camera::Camera;
 use crate::error::Result;
 
-/// An image: its name, its camera's number, and where it was taken.
+/// An image: its name, the number of its camera, and its pose.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Posed {
     pub(super) name: String,
@@ -32,7 +32,7 @@ impl Posed {
         let to_camera = DMat3::from_quat(quaternion.normalize());
         let position = -(to_camera.transpose() * DVec3::from_array(self.translation));
         let size = [intrinsics.width, intrinsics.height];
-        // Columns of the rotation to the camera are rows of the one to the world.
+        // The columns of the world-to-camera rotation are the rows of the camera-to-world rotation.
         let rotation = to_camera.to_cols_array_2d();
         let camera =
             Camera::rounded(self.name.clone(), size, intrinsics.focal, position.to_array(), rotation);

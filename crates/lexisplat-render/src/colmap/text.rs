@@ -8,11 +8,12 @@ use super::pose::Posed;
 use crate::cameras_json::{MAX_CAMERAS, MAX_NAME};
 use crate::error::Result;
 
-/// What COLMAP writes before the number of images in a comment.
+/// Text before the number of images in COLMAP's comment.
 const COUNT_MARK: &str = "# Number of images:";
-/// Words before the name in an image's first line: number, four of rotation, three of translation, camera.
+/// Number of words before the name in an image's first line: the number, four of the rotation, three of the translation,
+/// and the camera.
 const WORDS_BEFORE_NAME: usize = 9;
-/// Words of a point of an image: x, y, and the number of the point it shows.
+/// Number of words of a point of an image: x, y, and the number of the 3D point.
 const POINT_WORDS: u64 = 3;
 
 pub(super) fn cameras<R: BufRead>(mut lines: Lines<'_, R>) -> Result<Cameras> {
@@ -56,7 +57,7 @@ fn camera(line: &str) -> Result<(u32, Intrinsics), String> {
     Ok((number, intrinsics().map_err(|problem| format!("camera {number}: {problem}"))?))
 }
 
-/// The images, and a warning if the file says that there are more or fewer.
+/// Returns the images, and a warning if the file states another number of images.
 pub(super) fn images<R: BufRead>(mut lines: Lines<'_, R>) -> Result<(Vec<Posed>, Vec<String>)> {
     let mut images = Vec::new();
     let mut said: Option<u64> = None;

@@ -1,7 +1,7 @@
-//! How pictures change with the colours, opacities and sizes of Gaussians.
+//! Products with the derivatives of pictures by the colours, opacities and sizes of Gaussians, and with the adjoint.
 //!
-//! A pixel is the sum over Gaussians of weight times colour. It is linear in all colours, and in each single opacity.
-//! Fitting them to pictures takes products with the matrix J of derivatives and with its adjoint.
+//! A pixel is the sum of weight times colour over all Gaussians. It is linear in all colours, and in each single opacity.
+//! Fitting colours and opacities to pictures takes products with the matrix J of derivatives and with its adjoint.
 
 use lexisplat::simd::Simd;
 use lexisplat::{Progress, Stage};
@@ -22,33 +22,34 @@ use super::splat::Splat;
 use super::trace::Trace;
 use super::workspace::Workspace;
 
-/// Changes of a Gaussian: of its red, green and blue; if there are four, of the natural logarithm of its opacity; if there
-/// are five, of those of its three scales alike too.
+/// Changes of the values of a Gaussian: of red, green and blue; with four values, also of the natural logarithm of its
+/// opacity; with five values, also of the logarithms of its three scales, which change alike.
 pub type GaussianChange<const N: usize> = [f32; N];
 
-/// Number of changes of a Gaussian with that of its opacity, and with that of its scales too.
+/// Number of values of a change with the opacity, and of a change with the opacity and the scales.
 const WITH_OPACITY: usize = 4;
 const WITH_SIZE: usize = 5;
 
-/// What the pictures of a scene lack, carried back to its Gaussians.
+/// The errors of the pictures of a scene, carried back to its Gaussians.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PictureErrors<const N: usize> {
-    /// For each Gaussian the adjoint of J times what the targets have more than the pictures.
+    /// For each Gaussian, the adjoint of J times the errors `target - picture`.
     pub errors: Vec<GaussianChange<N>>,
-    /// For each Gaussian the sum of its weights times those of all Gaussians: the sum of its row of J* J for one channel
-    /// of colour.
+    /// For each Gaussian, the sum over pixels of its weight times the weights of all Gaussians: the sum of its row of J*
+    /// J for one colour channel.
     pub row_sums: Vec<f32>,
-    /// For each Gaussian the sum of the squared derivatives by the logarithm of its opacity: the diagonal of J* J.
+    /// For each Gaussian, the sum of the squared derivatives by the logarithm of its opacity: the diagonal of J* J.
     pub opacity_squares: Vec<f32>,
-    /// The same by the logarithms of its scales; 0 unless `N` is 5.
+    /// For each Gaussian, the sum of the squared derivatives by the logarithms of its scales: the diagonal of J* J. It is
+    /// 0 unless `N` is 5.
     pub size_squares: Vec<f32>,
 }
 
-/// The pictures of a scene over black, and their derivatives J by its Gaussians' colours, opacities and sizes.
+/// The pictures of a scene over black, and their derivatives J by the colours, opacities and sizes of its Gaussians.
 ///
-/// J knows of the pixels that a Gaussian shows in, and not of those that it reaches as it grows. In anti-aliased scenes it does
-/// not know that a Gaussian's opacity on screen depends on its size.
+/// J covers the pixels in which a Gaussian shows, but not the pixels that the Gaussian reaches only when it grows. In
+/// anti-aliased scenes J ignores that the opacity of a Gaussian on screen depends on its size.
 #[derive(Debug)]
 pub struct PictureAdjoint<'a> {
     scene: Scene<'a>,
@@ -58,7 +59,7 @@ pub struct PictureAdjoint<'a> {
 }
 
 impl<'a> PictureAdjoint<'a> {
-    /// The pictures of `scene` from `cameras`.
+    /// Returns the pictures of `scene` from `cameras`.
     ///
     /// # Errors
     /// As [`crate::render`].
@@ -69,10 +70,11 @@ impl<'a> PictureAdjoint<'a> {
         Ok(Self { scene, cameras, workspace, pool: Pool::default() })
     }
 
-    /// Returns the adjoint of J times the errors of the pictures: what `targets`, one for each camera, have more than
-    /// them. Both are clamped to 0 to 1. Sums are averaged over the pixels of a view, and over the views.
+    /// Returns the adjoint of J times the errors of the pictures. An error is `target - picture`, with both clamped to 0
+    /// to 1. There is one of `targets` for each camera. Sums over pixels are divided by the number of pixels of a view,
+    /// and averaged over the views.
     ///
-    /// Reports [`Stage::Draw`], in views, to `progress`, and asks it before each view whether to stop.
+    /// Reports [`Stage::Draw`] to `progress`, in views, and asks it before each view whether to stop.
     ///
     /// # Errors
     /// [`Error::Parameter`] if a target is missing or has another size than its camera;
@@ -106,7 +108,8 @@ impl<'a> PictureAdjoint<'a> {
         })
     }
 
-    /// Returns the adjoint of J times J times `changes`, one for each Gaussian, averaged as in [`Self::of_errors`].
+    /// Returns the adjoint of J times J times `changes`. There is one change for each Gaussian. Sums are averaged as in
+    /// [`Self::of_errors`].
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are more or fewer changes than Gaussians; [`Error::Codec`](crate::Error::Codec) if
@@ -127,7 +130,8 @@ impl<'a> PictureAdjoint<'a> {
         )
     }
 
-    /// What `carry` makes of `light`, which is worked out for each tile of each view after it was drawn.
+    /// Applies `carry` to each tile of each view after the tile is drawn, with the values that `light` returns for its
+    /// pixels.
     fn apply<const N: usize, const M: usize>(
         &mut self,
         light: impl Fn(&Canvas, &Trace, usize, Tile) -> Light<M> + Sync,
@@ -173,8 +177,8 @@ impl<'a> PictureAdjoint<'a> {
 /// `N` values for each pixel of a tile, by column and row of blocks.
 type Light<const N: usize> = [[[Lanes; N]; BLOCKS]; BLOCKS];
 
-/// What the pixels of `target` have more than those of a finished tile, and the sum of all weights there; 0 beyond the
-/// border.
+/// Returns the errors `target - picture` of the pixels of a finished tile, and the sum of all weights in each pixel. The
+/// values are 0 beyond the border.
 #[inline(always)]
 fn errors(picture: &Canvas, target: &Image, tile: Tile) -> Light<4> {
     let mut light = [[[[0.0; LANES]; 4]; BLOCKS]; BLOCKS];
@@ -195,7 +199,7 @@ fn errors(picture: &Canvas, target: &Image, tile: Tile) -> Light<4> {
     light
 }
 
-/// J times `changes` at each pixel of a finished tile.
+/// Returns J times `changes` at each pixel of a finished tile.
 #[inline(always)]
 fn changed<const N: usize>(
     picture: &Canvas,
@@ -226,7 +230,7 @@ fn changed<const N: usize>(
     light
 }
 
-/// The adjoint of J times `light`, of each splat in `trace`, by the Gaussian's index.
+/// Returns the adjoint of J times `light`, for each splat in `trace`, with the index of its Gaussian.
 #[inline(always)]
 fn carried<const N: usize>(
     picture: &Canvas,
@@ -243,13 +247,13 @@ fn carried<const N: usize>(
     )
 }
 
-/// Places of sums in what [`carried_with_squares`] returns.
+/// Places of sums in the result of [`carried_with_squares`].
 const ROW_SUM: usize = 5;
 const OPACITY_SQUARES: usize = 6;
 const SIZE_SQUARES: usize = 7;
 
-/// [`carried`] for the first three values of `light`; then the sum of weights times the fourth, and those of the squared
-/// derivatives by the opacity and by the size.
+/// Returns the values of [`carried`] for the first three values of `light`, then the sum of weights times the fourth
+/// value of `light`, then the sums of the squared derivatives by the opacity and by the size.
 #[inline(always)]
 fn carried_with_squares<const N: usize>(
     picture: &Canvas,
@@ -277,7 +281,7 @@ fn carried_with_squares<const N: usize>(
     )
 }
 
-/// Adds to the first `N` of `sums` what one block carries back of the first three values of `light`.
+/// Adds the products of one block's derivatives with the first three values of `light` to the first `N` of `sums`.
 #[inline(always)]
 fn add_carried<const N: usize, const SUMS: usize, const M: usize>(
     sums: &mut [Lanes; SUMS],
@@ -302,7 +306,8 @@ fn products_added(sums: &Lanes, a: &Lanes, b: &Lanes) -> Lanes {
     sums
 }
 
-/// Sums over the pixels of each splat in `trace`, by the Gaussian's index. `add` adds those of one block.
+/// Returns sums over the pixels of each splat in `trace`, with the index of its Gaussian. `add` adds the sums of one
+/// block.
 #[inline(always)]
 fn summed<const N: usize, const SUMS: usize>(
     picture: &Canvas,
@@ -329,27 +334,28 @@ fn summed<const N: usize, const SUMS: usize>(
     out
 }
 
-/// The sums over lanes, which become 0.
+/// Returns the sums over lanes, and sets them to 0.
 #[inline(always)]
 fn take<const N: usize>(sums: &mut [Lanes; N]) -> [f32; N] {
     std::mem::replace(sums, [[0.0; LANES]; N]).map(|lanes| lanes.iter().sum())
 }
 
-/// How the pixels of a block change with a splat.
+/// Derivatives of the pixels of a block by the values of a splat.
 struct Derivatives {
-    /// Those of a channel by that channel of its colour.
+    /// Derivatives of a colour channel by the same channel of the splat's colour.
     weights: Lanes,
-    /// Those of the three channels by the logarithm of its opacity.
+    /// Derivatives of the three channels by the logarithm of the splat's opacity.
     by_opacity: [Lanes; 3],
-    /// The change of the logarithm of its opacity there with the logarithms of its scales; 0 unless `N` is [`WITH_SIZE`].
+    /// Derivatives of the logarithm of the splat's opacity in the pixel by the logarithms of its scales; 0 unless `N` is
+    /// [`WITH_SIZE`].
     power_by_size: Lanes,
 }
 
-/// Calls `with` for each mark of `trace`, from front to back: with the splat, and the column and row of the block.
+/// Calls `with` for each mark of `trace`, from front to back, with the splat and the column and row of the block.
 ///
-/// A splat of opacity `a` adds its weight times its colour, and leaves `1 - a` of the light to what lies behind it. So the
-/// derivative by its logarithm is the weight times the colour, less `a / (1 - a)` times all that is added behind it. It is 0
-/// where the opacity is cut off at its largest value.
+/// A splat of opacity `a` adds its weight times its colour, and passes `1 - a` of the light on to the splats behind it.
+/// The derivative by the logarithm of `a` is therefore the weight times the colour, less `a / (1 - a)` times the light
+/// that the splats behind it add. The derivative is 0 where the opacity is cut off at its largest value.
 #[inline(always)]
 fn each_mark<const N: usize>(
     picture: &Canvas,
@@ -361,7 +367,7 @@ fn each_mark<const N: usize>(
     let [x, y] = tile.coordinates();
     let mut open: [[Lanes; BLOCKS]; BLOCKS] =
         std::array::from_fn(|column| std::array::from_fn(|row| tile.inside(column, row)));
-    // What is added from a splat on, and behind it.
+    // The light added by a splat and all splats behind it.
     let mut behind: Light<3> = picture.blocks.map(|column| column.map(|block| block.colour));
     for mark in &trace.marks {
         let splat = &trace.splats[mark.splat as usize];
@@ -382,7 +388,7 @@ fn each_mark<const N: usize>(
                 each([&behind[channel], &weights, &odds], |[behind, weight, odds]| {
                     let own = weight * colour;
                     let behind = behind - own;
-                    // Without odds the opacity is cut off, or there is no weight.
+                    // The odds are 0 where the opacity is cut off, or where there is no weight.
                     let moved = f32::from_bits(own.to_bits() & mask(odds > 0.0));
                     [behind, moved - odds * behind]
                 });
@@ -395,8 +401,9 @@ fn each_mark<const N: usize>(
     }
 }
 
-/// By how much the power of a splat rises at pixels as the logarithms of its three scales do: with its conic C and the distance d
-/// from its centre, d^T C d, less what of the covariance does not grow, the dilation times |C d|^2.
+/// Returns the derivatives of a splat's power at pixels by the logarithms of its three scales, which change alike:
+/// `d^T C d - dilation * |C d|^2`, with the conic C and the distance d from the centre. The second term is there because
+/// the dilation in the covariance does not grow.
 #[inline(always)]
 fn power_by_size(splat: &Splat, x: &Lanes, y: &Lanes) -> Lanes {
     let [a, b, c] = splat.conic;

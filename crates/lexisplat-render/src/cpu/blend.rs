@@ -1,4 +1,4 @@
-//! Draws one tile: its splats from front to back, a block of 4 by 4 pixels at a time.
+//! Draws one tile. Its splats are drawn from front to back, a block of 4 by 4 pixels at a time.
 
 use lexisplat::simd::Simd;
 
@@ -9,25 +9,25 @@ use super::math::{exp_in_range, mask};
 use super::splat::Splat;
 use super::trace::Trace;
 
-/// Side of a block in pixels. Most splats are small, and touch fewer blocks than rows of a tile.
+/// Side of a block, in pixels. Most splats are small, and touch fewer blocks than rows of a tile.
 pub(super) const SIDE: usize = 4;
-/// Blocks of a row or a column of a tile.
+/// Number of blocks in a row or a column of a tile.
 pub(super) const BLOCKS: usize = TILE / SIDE;
-/// A block's pixels lie side by side, row by row.
+/// The pixels of a block lie side by side, row by row.
 const _: () = assert!(SIDE * SIDE == LANES);
 
-/// Splats that are fetched at a time. Each is likely not in the cache, and they are waited for together.
+/// Number of splats that are fetched together. Splats are likely not in the cache, so their latencies overlap.
 const FETCHED: usize = 16;
 
-/// A block being drawn.
+/// A block that is being drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
     /// Red, green and blue.
     pub(super) colour: [Lanes; 3],
-    /// The share of light that splats further back can add; 0 once the pixel is finished, and beyond the picture's
-    /// border.
+    /// Share of light that splats further back can add. It is 0 once the pixel is finished, and beyond the border of the
+    /// picture.
     pub(super) open: Lanes,
-    /// The share of light that the background adds. It stays 1 where the background is black.
+    /// Share of light that the background adds. It stays 1 if the background is black.
     transmittance: Lanes,
 }
 
@@ -38,33 +38,33 @@ impl Block {
 /// A tile of a picture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tile {
-    /// Its first pixel, as (column, row).
+    /// First pixel of the tile, as (column, row).
     corner: [usize; 2],
     /// Sides of the whole picture in pixels.
     size: [usize; 2],
-    /// Where its first pixel is in the picture that is drawn, as (column, row): where it is in the whole picture, unless
-    /// only some tiles are drawn.
+    /// Place of the tile's first pixel in the drawn picture, as (column, row). It equals `corner` unless only some tiles
+    /// are drawn.
     drawn: [usize; 2],
 }
 
 impl Tile {
-    /// The tile at `place`, as (column, row), of a picture of `size` pixels.
+    /// Returns the tile at `place`, as (column, row), of a picture of `size` pixels.
     pub(super) fn new(place: [usize; 2], size: [usize; 2]) -> Self {
         let corner = place.map(|k| k * TILE);
         Self { corner, size, drawn: corner }
     }
 
-    /// This tile as number `number` of a [`TileSet`](crate::TileSet).
+    /// Returns this tile as number `number` of a [`TileSet`](crate::TileSet).
     pub(super) fn of_set(self, number: usize) -> Self {
         Self { drawn: [0, number * TILE], ..self }
     }
 
-    /// Where its first pixel is in the picture that is drawn, as (column, row).
+    /// Returns the place of the tile's first pixel in the drawn picture, as (column, row).
     pub(super) fn drawn(self) -> [usize; 2] {
         self.drawn
     }
 
-    /// The x of the pixels in each column of blocks, and the y of those in each row.
+    /// Returns the x of the pixels in each column of blocks, and the y of the pixels in each row of blocks.
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are far below 2^24")]
     pub(super) fn coordinates(self) -> [[Lanes; BLOCKS]; 2] {
@@ -76,7 +76,7 @@ impl Tile {
         [coordinates(0, |lane| lane % SIDE), coordinates(1, |lane| lane / SIDE)]
     }
 
-    /// 1 at pixels of a block that lie within the picture and 0 elsewhere.
+    /// Returns 1 for the pixels of a block that lie within the picture, and 0 for the others.
     #[inline(always)]
     pub(super) fn inside(self, column: usize, row: usize) -> Lanes {
         let within = |k: usize, block: usize, at: usize| self.corner[k] + block * SIDE + at < self.size[k];
@@ -86,7 +86,7 @@ impl Tile {
         })
     }
 
-    /// The blocks that a splat may touch: from `first` to before `end`, as (column, row).
+    /// Returns the blocks that a splat may touch, from `first` to before `end`, as (column, row).
     #[inline(always)]
     fn reach(self, splat: &Splat) -> [[usize; 2]; 2] {
         let within = |pixel: u16, k: usize| usize::from(pixel).saturating_sub(self.corner[k]).min(TILE);
@@ -96,33 +96,33 @@ impl Tile {
     }
 }
 
-/// A tile being drawn. The next tile overwrites it.
+/// A tile that is being drawn. The next tile overwrites it.
 #[derive(Debug)]
 pub(super) struct Canvas {
-    /// Columns of blocks.
+    /// The blocks, column by column.
     pub(super) blocks: [[Block; BLOCKS]; BLOCKS],
-    /// Blocks with a pixel that is not finished.
+    /// Whether each block has a pixel that is not finished.
     open: [[bool; BLOCKS]; BLOCKS],
     queue: Queue,
 }
 
-/// Splats in blocks, waiting to be blended.
+/// Splats in blocks that wait to be blended.
 ///
-/// The steps of a batch are loops of their own. Most of their instructions then do not wait for each other: opacities
-/// depend on nothing drawn before.
+/// Each step of a batch is a loop of its own. Most instructions of such a loop do not wait for each other, because
+/// opacities do not depend on pixels drawn before.
 #[derive(Debug)]
 struct Queue {
     splats: [Splat; FETCHED],
     len: usize,
-    /// The splat's place in the batch, and column and row of the block, of each entry.
+    /// For each entry: the place of the splat in the batch, and the column and row of the block.
     places: [[u8; 3]; QUEUED],
-    /// The exponent of each pixel's opacity, and then the opacity.
+    /// For each entry: first the exponents of the opacities of the pixels, then the opacities.
     lanes: [Lanes; QUEUED],
 }
 
-/// Most entries of a queue: every block for every splat.
+/// Largest number of entries of a queue: every block for every splat.
 const QUEUED: usize = FETCHED * BLOCKS * BLOCKS;
-/// A queue's entries are counted by their low bits, so that no index can be out of range.
+/// Numbers of entries are reduced to their low bits, so that no index can be out of range.
 const _: () = assert!(QUEUED.is_power_of_two() && BLOCKS.is_power_of_two() && FETCHED.is_power_of_two());
 
 impl Default for Canvas {
@@ -138,7 +138,7 @@ impl Default for Canvas {
 }
 
 impl Queue {
-    /// Replaces the entries by those of the splats in `slots`, in the open blocks of `tile` that they may touch.
+    /// Replaces the entries by entries of the splats in `slots`, for the open blocks of `tile` that the splats may touch.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "a place in a batch or a tile")]
     fn fill(
@@ -169,7 +169,7 @@ impl Queue {
         }
     }
 
-    /// The splat and the block's column and row of an entry.
+    /// Returns the splat of an entry, and the column and row of its block.
     #[inline(always)]
     fn place(&self, at: usize) -> (&Splat, usize, usize) {
         let [k, column, row] = self.places[at % QUEUED].map(usize::from);
@@ -177,9 +177,9 @@ impl Queue {
     }
 }
 
-/// What is told of each splat that counts in a block: it shows in a pixel, or finishes one.
+/// Receives each splat that counts in a block: a splat that shows in a pixel or finishes one.
 pub(super) trait Watch {
-    /// `splat` has the opacities `alpha` in the block at (column, row) of the tile.
+    /// Called for `splat` with its opacities `alpha` in the block at (column, row) of the tile.
     fn counts(&mut self, splat: &Splat, block: [u8; 2], alpha: &Lanes);
 }
 
@@ -196,7 +196,7 @@ impl Watch for Trace {
 }
 
 impl Canvas {
-    /// Draws a tile over `background` from the splats in `list`, slots of `splats` from front to back.
+    /// Draws a tile over `background`. `list` has slots of `splats`, from front to back.
     pub(super) fn draw<'a>(
         &mut self,
         simd: Simd,
@@ -214,7 +214,7 @@ impl Canvas {
         );
     }
 
-    /// The pixel at column `x` and row `y` of the tile, over the background that it was drawn over.
+    /// Returns the pixel at column `x` and row `y` of the tile. `background` must be that of [`Self::draw`].
     #[inline(always)]
     pub(super) fn pixel(&self, x: usize, y: usize, background: [f32; 3]) -> [f32; 3] {
         let Block { colour, transmittance, .. } = &self.blocks[x / SIDE][y / SIDE];
@@ -222,7 +222,7 @@ impl Canvas {
         std::array::from_fn(|channel| colour[channel][lane] + transmittance[lane] * background[channel])
     }
 
-    /// [`Self::draw`], over black unless there is a `BACKGROUND`.
+    /// Draws like [`Self::draw`], and calls the [`Watch`]. The background is black unless `BACKGROUND` is set.
     #[inline(always)]
     pub(super) fn draw_watched<'a, const BACKGROUND: bool>(
         &mut self,
@@ -265,11 +265,11 @@ impl Canvas {
     }
 }
 
-/// Adds `splat` to the pixels of a block. Returns whether it shows in any or finishes any, and whether all are
-/// finished then.
+/// Adds `splat` to the pixels of a block. Returns two flags: whether the splat shows in a pixel or finishes one, and
+/// whether all pixels are finished afterwards.
 ///
 /// Loops are short, and conditions are masks, so that each loop becomes a few vector instructions. The compiler would
-/// make branches of other conditions.
+/// turn other conditions into branches.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 fn blend<const BACKGROUND: bool>(block: &mut Block, splat: &Splat, alpha: &Lanes) -> (bool, bool) {
@@ -277,8 +277,7 @@ fn blend<const BACKGROUND: bool>(block: &mut Block, splat: &Splat, alpha: &Lanes
     let mut still_open = 0;
     let mut changed = 0;
     for lane in 0..LANES {
-        // Where alpha is 0 an open pixel stays as it is, since it is never below the minimum. A finished one
-        // stays 0.
+        // Where alpha is 0 an open pixel keeps its value, which is never below the minimum. A finished pixel stays 0.
         let left = block.open[lane] * (1.0 - alpha[lane]);
         let add = mask(left >= TRANSMITTANCE_MIN);
         let weight = f32::from_bits((alpha[lane] * block.open[lane]).to_bits() & add);
@@ -296,11 +295,11 @@ fn blend<const BACKGROUND: bool>(block: &mut Block, splat: &Splat, alpha: &Lanes
     (changed != 0, still_open == 0)
 }
 
-/// What all blocks of a column have of a splat's exponents.
+/// The parts of a splat's exponents that all blocks of a column share.
 struct Across {
-    /// The conic's xx times the squared distance in x.
+    /// The xx of the conic times the squared distance in x.
     squared: Lanes,
-    /// The conic's xy times the distance in x.
+    /// The xy of the conic times the distance in x.
     product: Lanes,
 }
 
@@ -315,8 +314,8 @@ impl Across {
         Self { squared, product }
     }
 
-    /// Writes the exponents of the splat's opacities at the pixels of a block. Returns whether any may count. Those that
-    /// cannot become the cutoff, which cannot count either.
+    /// Writes the exponents of the splat's opacities at the pixels of a block. Exponents that cannot count become the
+    /// cutoff, which cannot count either. Returns whether any exponent may count.
     #[inline(always)]
     fn powers(&self, powers: &mut Lanes, splat: &Splat, y: &Lanes) -> bool {
         let Splat { conic: [_, _, c], cutoff, .. } = *splat;
@@ -331,7 +330,8 @@ impl Across {
     }
 }
 
-/// Replaces the exponents of a block's pixels by the opacities there, 0 where the splat does not count.
+/// Replaces the exponents of a block's pixels by the opacities of the splat there, or by 0 where the splat does not
+/// count.
 #[inline(always)]
 fn alphas(lanes: &mut Lanes, opacity: f32) {
     for p in lanes {

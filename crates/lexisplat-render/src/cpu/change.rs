@@ -1,4 +1,4 @@
-//! Carries changes of splats on screen over to the values of Gaussians in the world.
+//! Carries moments of splats on screen over to sensitivities of the values of Gaussians in the world.
 
 use lexisplat::simd::Simd;
 use lexisplat::{Geometry, Sensitivity};
@@ -11,11 +11,11 @@ use super::moments::{Moments, SUMS};
 use super::project::{Body, Derivatives, Projection};
 use super::visible::GAUSSIANS_PER_TASK;
 
-/// Colour channels of a picture.
+/// Number of colour channels of a picture.
 const CHANNELS: f32 = 3.0;
 
-/// Carries one view's moments, one for each Gaussian, over to the world, and adds its share to the `total` over
-/// `views`. Zeroes the moments.
+/// Carries one view's moments over to the world, and adds the share of the view to the `total` of `views` views. There is
+/// one set of moments for each Gaussian. Sets the moments to zero.
 pub(crate) fn carry(
     total: &mut Sensitivity,
     projection: &Projection,
@@ -49,7 +49,7 @@ pub(crate) fn carry(
     });
 }
 
-/// The moments and the sensitivities of some Gaussians that follow one another.
+/// The moments and sensitivities of consecutive Gaussians.
 struct Task<'a> {
     moments: &'a mut [Moments],
     position: &'a mut [[f32; 6]],
@@ -62,8 +62,8 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Carries the moments of the Gaussians from `first` on. A sum over pixels counts by its share of one picture alone and
-    /// of all.
+    /// Carries the moments of the Gaussians from `first` on over to the world. Sums over pixels are multiplied by the
+    /// weight of a pixel in its own picture and in the mean of all pictures.
     #[inline(always)]
     fn carry(
         &mut self,
@@ -115,7 +115,7 @@ struct Change {
 }
 
 impl Change {
-    /// Carries the moments of a group over to the world.
+    /// Carries the moments of a group of Gaussians over to the world.
     #[inline(always)]
     fn of(projection: &Projection, body: &Body, m: &[Lanes; SUMS]) -> Self {
         let Derivatives { by_position: [x, y, z], axes: [a, b, c] } = &projection.derivatives(body);
@@ -139,13 +139,13 @@ impl Change {
         Self { position, scale: [fourth(a, a, m), fourth(b, b, m), fourth(c, c, m)], rotation }
     }
 
-    /// Whether all values of a lane are finite.
+    /// Returns whether all values of a lane are finite.
     fn is_finite(&self, lane: usize) -> bool {
         self.position.iter().chain(&self.scale).chain(&self.rotation).all(|values| values[lane].is_finite())
     }
 }
 
-/// The sums of (u . p) (u . q), by the second moments.
+/// Returns the sums of `(u . p) (u . q)`, from the second moments.
 #[inline(always)]
 fn product(p: &[Lanes; 2], q: &[Lanes; 2], m: &[Lanes; SUMS]) -> Lanes {
     let inputs = [&p[0], &p[1], &q[0], &q[1], &m[2], &m[3], &m[4]];
@@ -154,12 +154,12 @@ fn product(p: &[Lanes; 2], q: &[Lanes; 2], m: &[Lanes; SUMS]) -> Lanes {
     product
 }
 
-/// The sums of (u . p)^2 (u . q)^2, by the fourth moments; not below 0.
+/// Returns the sums of `(u . p)^2 (u . q)^2`, from the fourth moments. They are at least 0.
 #[inline(always)]
 fn fourth(p: &[Lanes; 2], q: &[Lanes; 2], m: &[Lanes; SUMS]) -> Lanes {
     let inputs = [&p[0], &p[1], &q[0], &q[1], &m[5], &m[6], &m[7], &m[8], &m[9]];
     let [fourth] = each(inputs, |[px, py, qx, qy, m5, m6, m7, m8, m9]| {
-        // This is (u . p)^2 (u . q)^2 as a polynomial in u.
+        // This is `(u . p)^2 (u . q)^2` as a polynomial in u.
         let square = |x: f32, y: f32| [x * x, 2.0 * x * y, y * y];
         let (p, q) = (square(px, py), square(qx, qy));
         let value = p[0] * q[0] * m5
@@ -172,7 +172,8 @@ fn fourth(p: &[Lanes; 2], q: &[Lanes; 2], m: &[Lanes; SUMS]) -> Lanes {
     fourth
 }
 
-/// `value` times the squared lever of a turn in the plane of two axes with these logarithms of lengths.
+/// Returns `value` times the squared lever of a rotation in the plane of two axes. `scale` and `other` are the logarithms
+/// of their lengths.
 #[inline(always)]
 fn levered(value: &Lanes, scale: &Lanes, other: &Lanes) -> Lanes {
     let [levered] = each([value, scale, other], |[value, scale, other]| {

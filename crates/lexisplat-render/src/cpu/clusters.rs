@@ -1,4 +1,4 @@
-//! Groups of Gaussians, so that a picture need not project those that are outside of it.
+//! Groups of Gaussians. A picture need not project the groups that are outside of it.
 
 use lexisplat::Geometry;
 
@@ -13,30 +13,30 @@ pub(super) struct Sphere {
     pub(super) scale: f32,
 }
 
-/// The Gaussians of a scene in clusters of [`LANES`] that follow one another. Where neighbours do, as in packed files, most
-/// clusters are outside of most pictures from inside a scene.
+/// The Gaussians of a scene in clusters of [`LANES`] consecutive Gaussians. If consecutive Gaussians are neighbours, as
+/// in packed files, most clusters are outside of most pictures from inside a scene.
 #[derive(Debug)]
 pub(super) struct Clusters {
-    /// Of each cluster.
+    /// One sphere for each cluster.
     spheres: Vec<Sphere>,
     /// Number of Gaussians.
     len: usize,
 }
 
 impl Clusters {
-    /// The clusters of `geometry`.
+    /// Returns the clusters of `geometry`.
     pub(super) fn of(geometry: &Geometry) -> Self {
         let clusters = geometry.positions.chunks(LANES).zip(geometry.scales.chunks(LANES));
         let spheres = clusters.map(|(positions, scales)| Sphere::around(positions, scales)).collect();
         Self { spheres, len: geometry.len() }
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub(super) fn len(&self) -> usize {
         self.len
     }
 
-    /// The sphere of the cluster that begins with Gaussian `first`, a multiple of [`LANES`].
+    /// Returns the sphere of the cluster that begins with Gaussian `first`, a multiple of [`LANES`].
     #[inline(always)]
     pub(super) fn at(&self, first: usize) -> Option<&Sphere> {
         self.spheres.get(first / LANES)
@@ -44,7 +44,7 @@ impl Clusters {
 }
 
 impl Sphere {
-    /// Positions that are not finite do not count, for nothing is drawn there.
+    /// Positions that are not finite do not count, because such Gaussians are not drawn.
     fn around(positions: &[[f32; 3]], scales: &[[f32; 3]]) -> Self {
         let finite = || positions.iter().filter(|p| p.iter().all(|v| v.is_finite()));
         let (mut least, mut most) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);

@@ -15,12 +15,12 @@ pub(super) const TILE_F32: f32 = TILE as f32;
 pub(super) struct Grid {
     pub(super) columns: usize,
     pub(super) rows: usize,
-    /// Columns and rows, as numbers.
+    /// Number of columns and of rows.
     counts: [f32; 2],
 }
 
 impl Grid {
-    /// The tiles of a picture whose sides are at most [`crate::MAX_SIDE`].
+    /// Returns the tiles of a picture whose sides are at most [`crate::MAX_SIDE`].
     pub(super) fn new(width: usize, height: usize) -> Self {
         let (columns, rows) = (width.div_ceil(TILE), height.div_ceil(TILE));
         #[expect(clippy::cast_precision_loss, reason = "at most 1024")]
@@ -28,8 +28,8 @@ impl Grid {
         Self { columns, rows, counts }
     }
 
-    /// Returns the column (0) or row (1) of tiles at `place`, in tiles. It is truncated toward zero and then clamped to
-    /// the grid or one beyond, as in C.
+    /// Returns the column (`axis` 0) or row (`axis` 1) of tiles at `place`, in tiles. The value is truncated toward zero,
+    /// as in C, and then clamped to the grid or one beyond.
     #[inline(always)]
     pub(super) fn tile(&self, axis: usize, place: f32) -> f32 {
         let place = if place > 0.0 { place } else { 0.0 };
@@ -42,7 +42,7 @@ impl Grid {
 pub(super) struct ChosenTiles {
     /// Whether each tile is drawn, row by row.
     wanted: Vec<bool>,
-    /// Columns and rows that hold all of them, in tiles.
+    /// Columns and rows of tiles that contain all drawn tiles.
     bounds: [Range<usize>; 2],
     columns: usize,
 }
@@ -62,13 +62,14 @@ impl ChosenTiles {
         Self { wanted, bounds, columns: grid.columns }
     }
 
-    /// Whether tile `tile` of the picture is drawn.
+    /// Returns whether tile number `tile` of the picture is drawn.
     #[inline(always)]
     pub(super) fn wants(&self, tile: usize) -> bool {
         self.wanted[tile]
     }
 
-    /// The part of `rect` in the columns and rows that hold all tiles that are drawn; `None` if no such tile is in it.
+    /// Returns the part of `rect` in the columns and rows that contain all drawn tiles; `None` if no drawn tile is in
+    /// `rect`.
     #[inline(always)]
     pub(super) fn within(&self, rect: PixelRect) -> Option<PixelRect> {
         let [columns, rows] = [rect.columns(), rect.rows()];
@@ -76,7 +77,7 @@ impl ChosenTiles {
         let [right, bottom] = [columns.end.min(self.bounds[0].end), rows.end.min(self.bounds[1].end)];
         let row = |row: usize| &self.wanted[row * self.columns + left..row * self.columns + right];
         let any = left < right && (top..bottom).any(|r| row(r).contains(&true));
-        // Tiles are counted within 16 bits' worth of pixels.
+        // The number of pixels of a side fits in 16 bits.
         let pixel = |tile: usize| u16::try_from(tile * TILE).unwrap_or(u16::MAX);
         any.then(|| PixelRect {
             min: [rect.min[0].max(pixel(left)), rect.min[1].max(pixel(top))],
@@ -86,13 +87,13 @@ impl ChosenTiles {
 }
 
 impl PixelRect {
-    /// The columns of tiles that it overlaps.
+    /// Returns the columns of tiles that the rectangle overlaps.
     #[inline(always)]
     pub(super) fn columns(self) -> Range<usize> {
         usize::from(self.min[0]) / TILE..usize::from(self.max[0]).div_ceil(TILE)
     }
 
-    /// The rows of tiles that it overlaps.
+    /// Returns the rows of tiles that the rectangle overlaps.
     #[inline(always)]
     pub(super) fn rows(self) -> Range<usize> {
         usize::from(self.min[1]) / TILE..usize::from(self.max[1]).div_ceil(TILE)

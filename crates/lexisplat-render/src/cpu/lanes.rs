@@ -1,7 +1,7 @@
-//! Groups of values that are worked on side by side.
+//! Groups of values that are processed side by side.
 
-/// Values of a group. A loop over them becomes vector instructions of 4, 8 or 16 values. Shorter loops are unrolled
-/// before they could.
+/// Number of values of a group. A loop over a group becomes vector instructions of 4, 8 or 16 values. The compiler would
+/// unroll shorter loops before it could vectorise them.
 pub(super) const LANES: usize = 16;
 
 /// One value for each member of a group.
@@ -9,7 +9,7 @@ pub(super) type Lanes = [f32; LANES];
 
 /// Applies `f` to the inputs of each lane.
 ///
-/// `f` must be inlined and have no branches; it should be short, since the compiler gives up on long loops.
+/// `f` must be inlined and have no branches. It should be short, because the compiler does not vectorise long loops.
 #[inline(always)]
 pub(super) fn each<const N: usize, const M: usize>(
     inputs: [&Lanes; N],

@@ -1,24 +1,24 @@
-//! Mathematical functions that give the same bits on every machine. Those of the system do not.
+//! Mathematical functions that give the same bits on every machine. Those of the operating system do not.
 
-/// Below this `exp` is 0, and above [`EXP_MAX`] it is infinite: there the result leaves the normal f32 range.
+/// Bounds of the range of `exp`. Below `EXP_MIN` the result is 0, and above [`EXP_MAX`] it is infinite, because it leaves
+/// the normal `f32` range.
 const EXP_MIN: f32 = -87.0;
 /// See [`EXP_MIN`].
 const EXP_MAX: f32 = 88.0;
 /// 1.5 * 2^23: adding and subtracting it rounds to the nearest integer.
 const ROUND: f32 = 12_582_912.0;
-/// ln 2 in two parts. The first has so few bits that its multiples are exact (Cephes `expf`).
+/// ln 2 in two parts. The first part has so few bits that its multiples are exact (Cephes `expf`).
 const LN2_HIGH: f32 = 0.693_359_4;
 const LN2_LOW: f32 = -2.121_944_4e-4;
 /// exp(r) = 1 + r + r^2 P(r) on [-ln 2 / 2, ln 2 / 2], highest power first (Cephes `expf`).
 const POLYNOMIAL: [f32; 6] = [1.987_569_2e-4, 1.398_2e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5];
-/// Exponent bias and position in an f32.
+/// Exponent bias and position of an `f32`.
 const BIAS: u32 = 127;
 const MANTISSA_BITS: u32 = 23;
 
 /// Returns e to the power `x`, with a relative error of at most 2e-7.
 ///
-/// It has no branches and no calls, so that loops over it become vector instructions. This holds for all functions
-/// here.
+/// Like all functions of this module it has no branches and no calls, so that loops over it become vector instructions.
 #[inline(always)]
 pub(super) fn exp(x: f32) -> f32 {
     let value = exp_in_range(x);
@@ -26,7 +26,7 @@ pub(super) fn exp(x: f32) -> f32 {
     if x > EXP_MAX { f32::INFINITY } else { value }
 }
 
-/// [`exp`] for `x` from [`EXP_MIN`] to [`EXP_MAX`]; any number for other `x`.
+/// Returns the same as [`exp`] for `x` from [`EXP_MIN`] to [`EXP_MAX`], and any number for other `x`.
 #[inline(always)]
 pub(super) fn exp_in_range(x: f32) -> f32 {
     let shifted = x * std::f32::consts::LOG2_E + ROUND;
@@ -45,17 +45,17 @@ pub(super) fn exp_in_range(x: f32) -> f32 {
     fraction * power
 }
 
-/// 1 / (1 + e^-x).
+/// Returns `1 / (1 + e^-x)`.
 #[inline(always)]
 pub(super) fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + exp(-x))
 }
 
-/// Bits of the square root of one half, where the logarithm's polynomial begins.
+/// Bits of the square root of one half, where the range of the logarithm's polynomial begins.
 const SQRT_HALF: u32 = 0x3f35_04f3;
 const MANTISSA: u32 = (1 << MANTISSA_BITS) - 1;
-/// ln(1 + f) = f - f^2 / 2 + f^3 P(f) for 1 + f from the square root of one half to that of 2, highest power first
-/// (Cephes `logf`).
+/// `ln(1 + f) = f - f^2 / 2 + f^3 P(f)` for `1 + f` from the square root of one half to the square root of 2, highest
+/// power first (Cephes `logf`).
 const LOGARITHM: [f32; 9] = [
     7.037_683_6e-2,
     -1.151_461e-1,
@@ -69,7 +69,7 @@ const LOGARITHM: [f32; 9] = [
 ];
 
 /// Returns the natural logarithm of a positive normal `x`, with an error of at most 2e-7 times the larger of 1 and the
-/// result; any number for other `x`.
+/// result. Returns any number for other `x`.
 #[inline(always)]
 #[expect(clippy::cast_possible_wrap, clippy::cast_precision_loss, reason = "an exponent has 8 bits")]
 pub(super) fn ln(x: f32) -> f32 {
@@ -90,13 +90,13 @@ pub(super) fn ln(x: f32) -> f32 {
     f + low + n * LN2_HIGH
 }
 
-/// All bits where `condition` holds, else none.
+/// Returns a word with all bits set if `condition` holds, otherwise 0.
 #[inline(always)]
 pub(super) fn mask(condition: bool) -> u32 {
     if condition { u32::MAX } else { 0 }
 }
 
-/// Returns a whole number from 0 to 65535 as an integer.
+/// Converts a whole number from 0 to 65535 to an integer.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range; else it saturates")]
 pub(super) fn whole(x: f32) -> u16 {

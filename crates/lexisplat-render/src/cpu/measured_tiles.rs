@@ -1,4 +1,4 @@
-//! Measures a view tile by tile, and hands on what each splat got in the order of the tiles.
+//! Measures a view tile by tile, and passes on the values of each splat in the order of the tiles.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -11,25 +11,25 @@ use super::tiles::{self, List};
 use super::trace::Trace;
 use super::workspace::Workspace;
 
-/// Splats in the lists of the tiles that are measured at a time, unless one tile has more. What is measured of them
-/// takes up to 48 bytes each: 6 MB.
+/// Largest number of splats in the lists of the tiles that are measured together, unless one tile has more. Their
+/// measurements take up to 48 bytes each: 6 MB.
 const ENTRIES: usize = 1 << 17;
 
-/// What measuring a tile overwrites.
+/// Memory that measuring a tile overwrites.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     pub(super) canvas: Canvas,
     pub(super) trace: Trace,
 }
 
-/// Memory that threads take turns with. There is as much of it as threads have used at once, and none of it grows anew
-/// for each tile.
+/// Memory that threads borrow in turn. There are as many pieces as threads have used at once, so that memory is not
+/// allocated for each tile.
 #[derive(Debug, Default)]
 pub(super) struct Pool(Mutex<Vec<Box<Scratch>>>);
 
 impl Pool {
     fn with<R>(&self, work: impl FnOnce(&mut Scratch) -> R) -> R {
-        // A thread that panicked kept what it had taken, so the rest is whole.
+        // A thread that panicked kept the piece that it had borrowed, so the other pieces are whole.
         let taken = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let mut scratch = taken().pop().unwrap_or_default();
         let result = work(&mut scratch);
@@ -38,8 +38,9 @@ impl Pool {
     }
 }
 
-/// Measures every tile of a view, of which `workspace` has the projected Gaussians, with `measure`. It returns values by
-/// the Gaussian's index. `add` gets them in the order of the tiles, so that sums do not depend on the number of threads.
+/// Measures every tile of a view with `measure`. `workspace` has the projected Gaussians of the view. `measure` returns
+/// values with the indices of Gaussians. `add` receives them in the order of the tiles, so that sums do not depend on the
+/// number of threads.
 pub(super) fn measure_tiles<T: Send>(
     workspace: &mut Workspace,
     pool: &Pool,

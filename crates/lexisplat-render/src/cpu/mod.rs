@@ -1,11 +1,12 @@
-//! The reference rasteriser: 3DGS's rules on the processor.
+//! The reference rasteriser: the rules of 3DGS on the processor.
 //!
-//! `visible` finds the Gaussians that may be seen, which `project` turns into ellipses on screen. `order` sorts them by
-//! depth, `tiles` lists for every tile the splats that may touch it, and `blend` draws the tiles. `moments` measures how
-//! a tile changes with its splats, and `change` carries that over to the Gaussians' values. `adjoint` is for fitting
-//! colours to pictures. Every step works in parallel
-//! on pieces whose borders and order do not depend on the number of threads. It uses only operations that round the
-//! same everywhere. A picture therefore has the same bits on any machine.
+//! `visible` finds the Gaussians that may be visible, and `project` turns them into ellipses on screen. `order` sorts
+//! them by depth, `tiles` lists for every tile the splats that may touch it, and `blend` draws the tiles. `moments`
+//! measures how a tile changes with its splats, and `change` carries these measurements over to the values of Gaussians.
+//! `adjoint` is for fitting colours, opacities and sizes to pictures.
+//!
+//! Every step works in parallel on pieces whose borders and order do not depend on the number of threads, and uses only
+//! operations that round the same everywhere. A picture therefore has the same bits on any machine.
 
 mod adjoint;
 mod blend;
@@ -49,54 +50,54 @@ pub(crate) use project::Projection;
 pub use sensitivity::sensitivity;
 pub(crate) use workspace::Workspace;
 
-/// How to draw. Whether the anti-aliased rules apply is a mark of the scene.
+/// Options of drawing. Whether the rules for anti-aliasing apply is a mark of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct RenderOptions {
-    /// Colour behind the scene, 0 to 1 in each channel. Black by default.
+    /// Colour behind the scene, each channel from 0 to 1. Black by default.
     pub background: [f32; 3],
-    /// Highest SH degree to draw with; bands above it are left out. By default all that the scene has count.
+    /// Highest SH degree to draw; bands above it are left out. By default all degrees of the scene are drawn.
     pub max_degree: Option<ShDegree>,
 }
 
 impl RenderOptions {
-    /// These options with another background.
+    /// Returns these options with another background.
     #[must_use]
     pub fn with_background(self, background: [f32; 3]) -> Self {
         Self { background, ..self }
     }
 
-    /// These options with another highest SH degree; `None` draws all that the scene has.
+    /// Returns these options with another highest SH degree; `None` draws all degrees of the scene.
     #[must_use]
     pub fn with_max_degree(self, max_degree: Option<ShDegree>) -> Self {
         Self { max_degree, ..self }
     }
 }
 
-/// A picture, and measurements of drawing it.
+/// A picture, and measurements of its drawing.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Drawn {
     /// The picture.
     pub image: Image,
-    /// Number of Gaussians that may touch it.
+    /// Number of Gaussians that may touch the picture.
     pub gaussians: usize,
-    /// The stages in order, each with its time in milliseconds.
+    /// The stages in order, each with its duration in milliseconds.
     pub stage_times: Vec<(&'static str, f64)>,
 }
 
 /// Draws `scene` as `camera` sees it.
 ///
-/// Leaves out Gaussians with values that are not finite, or that overflow on the way to the screen.
+/// Gaussians with values that are not finite, or that overflow in the projection, are left out.
 ///
 /// # Errors
-/// [`Error::Codec`](crate::Error::Codec) if the scene's arrays do not fit one another;
-/// [`Error::Parameter`](crate::Error::Parameter) if the camera cannot be drawn with.
+/// [`Error::Codec`](crate::Error::Codec) if the lengths of the scene's arrays do not match;
+/// [`Error::Parameter`](crate::Error::Parameter) if the camera is not valid.
 pub fn render(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Result<Image> {
     Ok(render_measured(scene, camera, options)?.image)
 }
 
-/// Draws as [`render`] does, and measures it.
+/// Draws like [`render`], and measures the drawing.
 ///
 /// # Errors
 /// As [`render`].
@@ -104,7 +105,7 @@ pub fn render_measured(scene: &Scene<'_>, camera: &Camera, options: &RenderOptio
     render_with(&mut Workspace::default(), scene, camera, options)
 }
 
-/// Draws as [`render_measured`] does, in the memory of `workspace`.
+/// Draws like [`render_measured`], in the memory of `workspace`.
 pub(crate) fn render_with(
     workspace: &mut Workspace,
     scene: &Scene<'_>,
@@ -128,7 +129,7 @@ impl StageTimer {
         Self { start: Instant::now(), times: Vec::new() }
     }
 
-    /// Adds the time since the last call to that of `stage`.
+    /// Adds the time since the last call to the duration of `stage`.
     fn end(&mut self, stage: &'static str) {
         let now = Instant::now();
         let milliseconds = now.duration_since(self.start).as_secs_f64() * 1e3;
@@ -140,7 +141,7 @@ impl StageTimer {
     }
 }
 
-/// Draws with at most `max_entries` in the tiles' lists at once.
+/// Draws with at most `max_entries` entries in the lists of tiles at once.
 fn draw(
     workspace: &mut Workspace,
     scene: &Scene<'_>,
@@ -165,7 +166,7 @@ fn draw(
         lists.fill(order, grid, projection.chosen.as_ref(), &band);
         stages.end("tiles");
         let tiles = projection.tiles(&band);
-        // Tiles that lie beside each other in the picture that is drawn: a row of them, or one of a set.
+        // Tiles that lie side by side in the drawn picture: a row of tiles, or one tile of a set.
         let rows: Vec<&[(usize, Tile)]> = tiles.chunk_by(|a, b| a.1.drawn()[1] == b.1.drawn()[1]).collect();
         let own = (rows.len() * TILE * side).min(rest.len());
         let (drawn, after) = std::mem::take(&mut rest).split_at_mut(own);

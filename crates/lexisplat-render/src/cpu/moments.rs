@@ -1,4 +1,4 @@
-//! Sums over a tile's pixels of products of derivatives: how the pixels change with the tile's splats.
+//! Sums over a tile's pixels of products of derivatives. They measure how the pixels change with the tile's splats.
 
 use lexisplat::simd::Simd;
 
@@ -9,11 +9,11 @@ use super::lanes::{LANES, Lanes};
 use super::splat::{Root, Splat};
 use super::trace::Trace;
 
-/// Number of sums that a splat has.
+/// Number of sums of a splat.
 pub(crate) const SUMS: usize = 10;
 
-/// Sums over pixels, for one splat. Alpha is its opacity at a pixel, T the light that the splats before it let
-/// through, C the pixel's colour, and u = R (centre - pixel), where R is the conic's [`Root`]:
+/// Sums over pixels for one splat. `alpha` is the opacity of the splat at a pixel, `T` the light that the splats before
+/// it let through, `C` the colour of the pixel, and `u = R (centre - pixel)`, where `R` is the [`Root`] of the conic:
 ///
 /// - `[0]`: (T alpha)^2, the squared derivative by one colour channel;
 /// - `[1]`: g = |dC / d ln alpha|^2;
@@ -24,8 +24,8 @@ pub(crate) const SUMS: usize = 10;
 #[repr(C)]
 pub(crate) struct Moments {
     pub(super) sums: [f32; SUMS],
-    /// The largest change of any channel of any pixel when the splat is left out. That change is dC / d ln alpha:
-    /// the light that the splat adds is lost, and the light that it covers comes back.
+    /// Largest change of any channel of any pixel when the splat is removed. The change is dC / d ln alpha: the light
+    /// that the splat adds is lost, and the light that it covers returns.
     pub(super) removal: f32,
 }
 
@@ -39,8 +39,8 @@ impl Moments {
     }
 }
 
-/// Returns the moments of the splats that show in a tile, by the Gaussian's index. `list` has slots of `splats` from
-/// front to back. `canvas` and `trace` are overwritten.
+/// Returns the moments of the splats that show in a tile, with the indices of their Gaussians. `list` has slots of
+/// `splats` from front to back. `canvas` and `trace` are overwritten.
 pub(super) fn tile<'a>(
     simd: Simd,
     splats: &[Splat],
@@ -59,28 +59,28 @@ pub(super) fn tile<'a>(
     )
 }
 
-/// A block as far as it has been drawn.
+/// The state of a block while it is drawn.
 #[derive(Clone, Copy)]
 struct Block {
     colour: [Lanes; 3],
     open: Lanes,
 }
 
-/// What is known of one splat, pixel column by pixel column.
+/// The sums of one splat, for each pixel column.
 struct Columns {
     /// Sums over a column of blocks.
     sums: [[f32; SIDE]; SUMS],
-    /// The largest changes so far, over all columns of blocks.
+    /// Largest changes so far, over all columns of blocks.
     removal: [f32; SIDE],
 }
 
 impl Columns {
     const ZERO: Self = Self { sums: [[0.0; SIDE]; SUMS], removal: [0.0; SIDE] };
 
-    /// Adds the sums to `moments`, and begins with the next column of blocks.
+    /// Adds the sums to `moments` and resets them for the next column of blocks.
     #[inline(always)]
     fn flush(&mut self, moments: &mut Moments) {
-        // The sums are independent, so they advance together, pixel column by pixel column.
+        // The sums are independent of each other, so they are advanced together, pixel column by pixel column.
         for k in 0..SIDE {
             moments.sums.iter_mut().zip(&self.sums).for_each(|(sum, column)| *sum += column[k]);
         }
@@ -124,7 +124,7 @@ fn sum(trace: &Trace, tile: Tile, picture: &Canvas) -> Vec<(u32, Moments)> {
     out
 }
 
-/// Draws `splat` on a block as `blend` does, and adds its moments to `columns`.
+/// Draws `splat` on a block like `blend`, and adds its moments to `columns`.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 fn add(
@@ -144,7 +144,7 @@ fn add(
         let shows = left >= TRANSMITTANCE_MIN;
         let weight = if shows { alpha * block.open[lane] } else { 0.0 };
         block.open[lane] = if shows { left } else { 0.0 };
-        // alpha / (1 - alpha) is the share of the light behind that one more unit of ln alpha takes away.
+        // `alpha / (1 - alpha)` is the share of the light from behind that is lost when ln alpha grows by one unit.
         let taken = if weight > 0.0 { alpha / (1.0 - alpha) } else { 0.0 };
         let mut g = 0.0;
         let mut largest = 0.0;

@@ -1,4 +1,4 @@
-//! Sorts splats by depth. That happens once for each picture, so that every tile's list comes out sorted.
+//! Sorts splats by depth, once for each picture, so that the list of every tile is sorted too.
 
 use std::ops::Range;
 
@@ -7,24 +7,24 @@ use crate::parallel::*;
 use super::splat::PixelRect;
 use super::visible::Visible;
 
-/// Passes of the sort. Each sorts by a digit.
+/// Number of passes of the sort. Each pass sorts by one digit.
 const PASSES: u32 = 3;
-/// Most values of a digit: three digits cover 32 bits.
+/// Largest number of values of a digit: three digits cover 32 bits.
 const MAX_DIGITS: usize = 1 << u32::BITS.div_ceil(PASSES);
-/// Splats whose pixels one task collects.
+/// Number of splats whose pixels one task collects.
 const RECTS_PER_TASK: usize = 1 << 14;
 
-/// Splats in the order of depth, the nearest first; those of equal depth are in order of index.
+/// Splats in the order of depth, the nearest first. Splats of equal depth are in the order of index.
 #[derive(Debug, Default)]
 pub(super) struct Order {
-    /// (depth, slot) of each.
+    /// (depth, slot) of each splat.
     pub(super) keys: Vec<(u32, u32)>,
-    /// What sorting writes to in turn with `keys`; then the pixels that each splat may touch.
+    /// Second buffer of the sort; afterwards the pixels that each splat may touch.
     spare: Vec<(u32, u32)>,
 }
 
 impl Order {
-    /// Sorts `keys`, the splats of `visible`.
+    /// Sorts `keys`, which are those of the splats of `visible`.
     pub(super) fn sort(&mut self, visible: &Visible) {
         sort(&mut self.keys, &mut self.spare);
         let tasks = self.spare.par_chunks_mut(RECTS_PER_TASK).zip(self.keys.par_chunks(RECTS_PER_TASK));
@@ -35,18 +35,18 @@ impl Order {
         });
     }
 
-    /// The slots of the splats from place `range.start` to before place `range.end`, and the pixels that they may touch.
+    /// Returns the slots of the splats at places `range.start` to before `range.end`, and the pixels that they may touch.
     pub(super) fn splats(&self, range: Range<usize>) -> impl Iterator<Item = (u32, PixelRect)> {
         let slots = self.keys[range.clone()].iter().map(|key| key.1);
         slots.zip(self.spare[range].iter().map(|words| PixelRect::from_words(*words)))
     }
 }
 
-/// Sorts (key, index) in ascending order of key. A stable radix sort: ties stay in order.
+/// Sorts (key, index) pairs in ascending order of key by a stable radix sort: pairs of equal keys keep their order.
 fn sort(pairs: &mut Vec<(u32, u32)>, spare: &mut Vec<(u32, u32)>) {
     let (least, most) = pairs.iter().fold((u32::MAX, 0), |(a, b), &(key, _)| (a.min(key), b.max(key)));
-    // Depths of one scene differ in few of their high bits. Digits as small as can be keep what is written to in the
-    // cache.
+    // The depths of a scene differ in few of their high bits. With the smallest possible digits the memory that is
+    // written to stays in the cache.
     let digit_bits = (u32::BITS - most.saturating_sub(least).leading_zeros()).div_ceil(PASSES).max(1);
     let digits = 1 << digit_bits;
     let digit = |pass: u32, key: u32| ((key - least) >> (pass * digit_bits)) as usize % digits;
@@ -74,7 +74,7 @@ fn sort(pairs: &mut Vec<(u32, u32)>, spare: &mut Vec<(u32, u32)>) {
 
 #[cfg(test)]
 impl Order {
-    /// Slots in this order that may touch these pixels.
+    /// Returns an order of `slots` as they are, which may touch the pixels `rects`.
     pub(super) fn of(slots: Vec<u32>, rects: &[PixelRect]) -> Self {
         let keys = slots.into_iter().map(|slot| (0, slot)).collect();
         Self { keys, spare: rects.iter().map(|rect| rect.to_words()).collect() }

@@ -19,59 +19,59 @@ use super::lanes::{LANES, Lanes, each};
 use super::math::{exp, ln, sigmoid, whole};
 use super::splat::{PixelRect, Root};
 
-/// Bound on the relative rounding error of each term of a power, and of the distances in it. It is 16 units in
-/// the last place; at most six roundings happen.
+/// Bound on the relative rounding error of each term of a power, and of the distances in it. It is 16 units in the last
+/// place; at most six roundings happen.
 const TERM_ERROR: f32 = 1e-6;
-/// Bound on the relative difference between the determinant of a conic as it is stored and that of the inverse of the
-/// covariance, for each unit of what the determinant loses to cancellation. It is 32 units in the last place; at most
-/// 14 roundings happen.
+/// Bound on the relative difference between the determinant of a stored conic and the determinant of the inverse
+/// covariance, divided by the factor that the determinant loses to cancellation. It is 32 units in the last place; at
+/// most 14 roundings happen.
 const CONIC_ERROR: f32 = 2e-6;
-/// A bound is given up where the determinant may be off by more than this share.
+/// Largest relative error of the determinant for which a bound is computed.
 const MAX_CONIC_ERROR: f32 = 0.5;
 /// Bound on the relative rounding error of the reach itself: 80 units in the last place.
 const REACH_ERROR: f32 = 5e-6;
-/// Bound on the rounding of positions in view space, as a share of the distance.
+/// Bound on the rounding of positions in view space, as a share of the distance from the camera.
 const VIEW_ERROR: f32 = 1e-5;
-/// Factor of lengths in view space, since rotations of cameras need not be quite orthonormal.
+/// Factor on lengths in view space, because camera rotations need not be exactly orthonormal.
 const VIEW_FACTOR: f32 = 1.02;
-/// Pixels by which a Gaussian may reach beyond its centre that do not depend on its size: INRIA's tiles, the dilation, the
+/// Pixels by which a Gaussian may reach beyond its centre independently of its size: INRIA's tiles, the dilation, the
 /// floor of its eigenvalues, and rounding.
 const PIXEL_MARGIN: f32 = TILE_F32 + 6.0;
 
-/// The values that all Gaussians of a picture are projected with.
+/// The values by which all Gaussians of a picture are projected.
 #[derive(Debug, Clone)]
 pub(crate) struct Projection {
     pub(super) camera: Camera,
     tan: [f32; 2],
     focal: [f32; 2],
     size: [f32; 2],
-    /// [`W_EPSILON`], in proportion to the near plane.
+    /// [`W_EPSILON`], scaled in proportion to the near plane.
     w_epsilon: f32,
     pub(super) grid: Grid,
-    /// The tiles that are drawn; `None` for all.
+    /// The tiles to draw; `None` draws all.
     pub(super) chosen: Option<ChosenTiles>,
     antialiased: bool,
-    /// Whether to leave out what cannot reach [`ALPHA_MIN`]. It makes no difference to the picture; tests check
-    /// that by drawing without it.
+    /// Whether to leave out pixels where a Gaussian cannot reach [`ALPHA_MIN`]. This does not change the picture; tests
+    /// compare with pictures drawn without it.
     tighten: bool,
 }
 
-/// A cutoff that leaves nothing out: far below any that could matter, and within the range of `exp`.
+/// A cutoff that leaves nothing out. It is far below any cutoff that matters, and within the range of `exp`.
 const NO_CUTOFF: f32 = -80.0;
 
-/// Values of a group of Gaussians in the world that say where and how large they are.
+/// Positions and shapes of a group of Gaussians in the world.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Body {
     pub(super) position: [Lanes; 3],
-    /// Logarithms of the standard deviations.
+    /// Natural logarithms of the standard deviations.
     pub(super) scales: [Lanes; 3],
     /// Quaternion, real part first.
     pub(super) rotation: [Lanes; 4],
-    /// Logit.
+    /// Logit of the opacity.
     pub(super) opacity: Lanes,
 }
 
-/// A group of Gaussians on screen, but for their colours.
+/// A group of Gaussians on screen, without their colours.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Placed {
     pub(super) centre: [Lanes; 2],
@@ -81,15 +81,15 @@ pub(super) struct Placed {
     pub(super) variance_y: Lanes,
     /// View-space z.
     pub(super) depth: Lanes,
-    /// Unit vectors from the camera to them.
+    /// Unit vectors from the camera to the Gaussians.
     pub(super) direction: [Lanes; 3],
-    /// The pixels that they may touch: the first column and row, and the first after the last. There are none where
-    /// nothing may be visible; the other values mean nothing then.
+    /// The pixels that the Gaussians may touch: the first column and row, and the first column and row after the last.
+    /// There are no pixels if the Gaussian cannot be visible; its other values then have no meaning.
     pub(super) pixels: [[Lanes; 2]; 2],
 }
 
 impl Body {
-    /// Returns these Gaussians, at most [`LANES`]. The rest of the lanes are zero.
+    /// Loads these Gaussians, at most [`LANES`]. The other lanes are zero.
     #[inline(always)]
     pub(super) fn load(geometry: &Geometry, gaussians: Range<usize>) -> Self {
         let mut out = Self {
@@ -121,7 +121,7 @@ fn columns<const N: usize>(columns: &mut [Lanes; N], rows: &[[f32; N]]) {
 impl Projection {
     pub(crate) fn new(camera: &Camera, antialiased: bool) -> Self {
         let grid = Grid::new(camera.width as usize, camera.height as usize);
-        // Sides are at most 16384: exact.
+        // Sides are at most 16384, so the conversion is exact.
         #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
         let size = [camera.width as f32, camera.height as f32];
         let focal = [camera.fx, camera.fy];
@@ -132,19 +132,19 @@ impl Projection {
         Self { camera, tan, focal, size, w_epsilon, grid, chosen, antialiased, tighten: true }
     }
 
-    /// Width and height of the picture in pixels.
+    /// Returns the width and height of the picture, in pixels.
     pub(super) fn size(&self) -> [usize; 2] {
         [self.camera.width as usize, self.camera.height as usize]
     }
 
-    /// Number of pixels of the whole picture, and of those that are drawn.
+    /// Returns the number of pixels of the whole picture, and the number of drawn pixels.
     #[expect(clippy::cast_precision_loss, reason = "counts of pixels, to single precision")]
     pub(super) fn pixel_counts(&self) -> [f32; 2] {
         let whole = self.size[0] * self.size[1];
         [whole, self.camera.tiles.as_ref().map_or(whole, |set| set.pixels() as f32)]
     }
 
-    /// The tiles of the rows in `band` that are drawn: numbers within the band, and places in the picture.
+    /// Returns the drawn tiles in the rows of `band`: their numbers within the band, and their places in the picture.
     pub(super) fn tiles(&self, band: &Range<usize>) -> Vec<(usize, Tile)> {
         let (grid, size) = (self.grid, self.size());
         let at = |tile: usize| Tile::new([tile % grid.columns, tile / grid.columns], size);
@@ -160,14 +160,14 @@ impl Projection {
         }
     }
 
-    /// This projection, without leaving anything out.
+    /// Returns this projection with `tighten` off.
     #[cfg(test)]
     pub(super) fn untightened(self) -> Self {
         Self { tighten: false, ..self }
     }
 
-    /// Whether a Gaussian with its centre in `sphere` and no larger scale than that of the sphere may touch a pixel that is
-    /// drawn. `false` is sure.
+    /// Returns whether a Gaussian with its centre in `sphere`, and a scale that is not larger than the sphere's, may
+    /// touch a drawn pixel. `false` is certain.
     pub(super) fn may_see(&self, sphere: &Sphere) -> bool {
         let view = self.camera.to_view(sphere.centre);
         let length = (view[0] * view[0] + view[1] * view[1] + view[2] * view[2]).sqrt();
@@ -176,12 +176,13 @@ impl Projection {
         if z + radius <= self.camera.near {
             return false;
         }
-        // INRIA's radius is that many deviations of an ellipse whose variances add up to at most the square of this, over the
-        // depth, and the margin.
+        // INRIA's radius is [`RADIUS_SIGMAS`] standard deviations of an ellipse. The variances of that ellipse add up to
+        // at most the square of `stretch * scale / depth`. The margin is added.
         let limits = self.tan.map(|tan| 1.0 + (TAN_LIMIT * tan).powi(2));
         let stretch = (self.focal[0].powi(2) * limits[0] + self.focal[1].powi(2) * limits[1]).sqrt();
         let reach = VIEW_FACTOR * RADIUS_SIGMAS * stretch * sphere.scale;
-        // A centre at x in view space is `reach / z + PIXEL_MARGIN` pixels outside where x > tangent * z + beside.
+        // A centre at x in view space is `reach / z + PIXEL_MARGIN` pixels outside of the picture where
+        // `x > tangent * z + beside`.
         let is_outside = |k: usize| {
             let tangent = self.tan[k] + PIXEL_MARGIN / self.focal[k];
             let beside = reach / self.focal[k];
@@ -192,7 +193,7 @@ impl Projection {
         }
         let nearest = z - radius;
         let Some(chosen) = self.chosen.as_ref().filter(|_| nearest > self.camera.near) else { return true };
-        // The pixels that centres may have, and as many around them as a Gaussian reaches.
+        // The pixels where centres may lie, extended by the reach of a Gaussian.
         let around = reach / nearest + PIXEL_MARGIN;
         let pixels = |k: usize| {
             let [low, high] = [view[k] - radius, view[k] + radius];
@@ -235,7 +236,7 @@ impl Projection {
             let drawn = (z > self.camera.near) & is_ellipse(det) & finite & (opacity >= ALPHA_MIN);
             [if drawn & is_finite(opacity) { 1.0 } else { 0.0 }]
         });
-        // Where nothing is drawn, the pixels end where they begin.
+        // A Gaussian that is not drawn has pixels that end where they begin.
         let [_, ends] = &mut pixels;
         for end in ends {
             [*end] = each([&*end, &visible], |[end, visible]| [if visible > 0.0 { end } else { 0.0 }]);
@@ -253,7 +254,7 @@ impl Projection {
     }
 
     /// Returns the derivatives that carry changes of a group of Gaussians on screen over to the world. They are not
-    /// finite where there is no ellipse on screen.
+    /// finite if a Gaussian has no ellipse on screen.
     #[inline(always)]
     pub(super) fn derivatives(&self, body: &Body) -> Derivatives {
         let view = self.view(body);
@@ -276,8 +277,8 @@ impl Projection {
         }
     }
 
-    /// Returns by how much Gaussians at `view` move on screen for each unit along a world axis, whose components in view
-    /// space are given.
+    /// Returns how far Gaussians at `view` move on screen for each unit of a move along a world axis. The components of
+    /// the axis in view space are given.
     #[inline(always)]
     fn moved(&self, view: &[Lanes; 3], [right, down, forward]: &[f32; 3]) -> [Lanes; 2] {
         let [x, y, z] = view;
@@ -289,7 +290,7 @@ impl Projection {
         })
     }
 
-    /// Returns positions in view space.
+    /// Returns the positions in view space.
     #[inline(always)]
     fn view(&self, body: &Body) -> [Lanes; 3] {
         let [x, y, z] = &body.position;
@@ -315,7 +316,7 @@ impl Projection {
         [self.seen(&jacobian, &axes[0]), self.seen(&jacobian, &axes[1]), self.seen(&jacobian, &axes[2])]
     }
 
-    /// Returns vectors in the world as they are on screen, by the entries of the Jacobian.
+    /// Returns vectors of the world on screen. The first argument has the entries of the Jacobian.
     #[inline(always)]
     fn seen(&self, [xx, xz, yy, yz]: &[Lanes; 4], [x, y, z]: &[Lanes; 3]) -> [Lanes; 2] {
         let r = &self.camera.rotation;
@@ -325,7 +326,8 @@ impl Projection {
         })
     }
 
-    /// Returns the pixels that may be touched: the first column and row, and the first after the last.
+    /// Returns the pixels that a Gaussian may touch: the first column and row, and the first column and row after the
+    /// last.
     #[inline(always)]
     fn pixels(&self, centre: &[Lanes; 2], ellipse: &Ellipse, cutoff: &Lanes) -> [[Lanes; 2]; 2] {
         let level = self.level(centre, ellipse, cutoff);
@@ -336,7 +338,7 @@ impl Projection {
         [[x_first, y_first], [x_end, y_end]]
     }
 
-    /// Returns the first column (axis 0) or row (axis 1) that may be touched, and the first after the last.
+    /// Returns the first column (`axis` 0) or row (`axis` 1) that a Gaussian may touch, and the first after the last.
     #[inline(always)]
     fn pixels_along(
         &self,
@@ -348,10 +350,10 @@ impl Projection {
     ) -> [Lanes; 2] {
         each([centre, variance, level, radius], |[centre, variance, level, radius]| {
             let reach = (level * variance).sqrt();
-            // Sums with the centre are rounded too.
+            // Sums with the centre are rounded too, hence the larger reach.
             let reach = reach + REACH_ERROR * (reach + centre.abs() + 1.0);
             let reach = if self.tighten { reach } else { f32::INFINITY };
-            // INRIA's tiles (`getRect`): those that the square of `radius` overlaps, truncated as in C.
+            // INRIA's tiles (`getRect`): the tiles that the square of `radius` overlaps, truncated as in C.
             let first = self.grid.tile(axis, (centre - radius) / TILE_F32);
             let end = self.grid.tile(axis, (centre + radius + (TILE_F32 - 1.0)) / TILE_F32);
             let least = (centre - reach).ceil();
@@ -360,16 +362,17 @@ impl Projection {
         })
     }
 
-    /// Returns the level whose product with a variance is the largest squared distance from the centre, in x or y, of
-    /// pixels whose power, as `blend` computes it, reaches `cutoff`. It is infinite where there is no such bound.
+    /// Returns a level for each Gaussian. Its product with the variance in x or y bounds the squared distance from the
+    /// centre in x or y of all pixels whose power, as computed by `blend`, reaches `cutoff`. The level is infinite if
+    /// there is no such bound.
     ///
-    /// Those pixels satisfy `a dx^2 + 2 b dx dy + c dy^2 <= level` over the conic as it is stored, but for rounding.
+    /// Apart from rounding, these pixels satisfy `a dx^2 + 2 b dx dy + c dy^2 <= level` with the stored conic.
     #[inline(always)]
     fn level(&self, centre: &[Lanes; 2], ellipse: &Ellipse, cutoff: &Lanes) -> Lanes {
         let [a, b, c] = &ellipse.conic;
         let [x, y] = centre;
         let [terms] = each([a, b, c, x, y], |[a, b, c, x, y]| {
-            // The largest distance of a pixel, where terms, and with them rounding errors, are largest.
+            // The largest distance of a pixel. Terms, and therefore rounding errors, are largest there.
             let far = |k: usize, v: f32| greater(v.abs(), (self.size[k] - 1.0 - v).abs());
             let (x, y) = (far(0, x), far(1, y));
             [0.5 * (a * x * x + c * y * y) + (b * x * y).abs()]
@@ -385,13 +388,13 @@ impl Projection {
     }
 }
 
-/// The larger of two numbers; `b` if `a` is no number.
+/// Returns the larger of two numbers; `b` if `a` is NaN.
 #[inline(always)]
 fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The smaller of two numbers; `b` if `a` is no number.
+/// Returns the smaller of two numbers; `b` if `a` is NaN.
 #[inline(always)]
 fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -402,21 +405,21 @@ fn is_finite(x: f32) -> bool {
     x.abs() < f32::INFINITY
 }
 
-/// Whether an ellipse with this determinant can be drawn.
+/// Returns whether an ellipse with this determinant can be drawn.
 #[inline(always)]
 fn is_ellipse(det: f32) -> bool {
     (det != 0.0) & is_finite(det)
 }
 
-/// How a group of Gaussians on screen changes with their values in the world, in the coordinates of their [`Root`]s.
+/// Derivatives of a group of Gaussians on screen by their values in the world, in the coordinates of their [`Root`]s.
 pub(super) struct Derivatives {
-    /// The change of the centre with each world coordinate.
+    /// Derivatives of the centre by each world coordinate.
     pub(super) by_position: [[Lanes; 2]; 3],
-    /// The three standard deviations as vectors.
+    /// The three standard deviations as vectors on screen.
     pub(super) axes: [[Lanes; 2]; 3],
 }
 
-/// `R v` of each lane, for the entries of the roots.
+/// Returns `R v` of each lane. `root` has the entries of the roots `R`.
 #[inline(always)]
 fn rooted(root: &[Lanes; 3], v: &[Lanes; 2]) -> [Lanes; 2] {
     each([&root[0], &root[1], &root[2], &v[0], &v[1]], |[xx, xy, yy, x, y]| Root([xx, xy, yy]).of([x, y]))
@@ -429,7 +432,7 @@ struct Ellipse {
     variance: [Lanes; 2],
     /// Determinant of the covariance.
     det: Lanes,
-    /// In pixels, whole numbers.
+    /// Radius in pixels, a whole number.
     radius: Lanes,
     /// Factor of the opacity in anti-aliased scenes.
     shrink: Lanes,
@@ -439,8 +442,8 @@ impl Ellipse {
     /// Returns the ellipses of Gaussians with these axes on screen.
     #[inline(always)]
     fn of(on_screen: &[[Lanes; 2]; 3]) -> Self {
-        // The covariance is the sum of the squares of the axes on screen. INRIA projects the covariance of the
-        // world instead. That is the same sum, but loses thin Gaussians to cancellation.
+        // The covariance is the sum of the squares of the axes on screen. INRIA projects the covariance in the world
+        // instead. This gives the same sum, but loses thin Gaussians to cancellation.
         let [p, q, r] = on_screen;
         let [a, b, c, before] =
             each([&p[0], &p[1], &q[0], &q[1], &r[0], &r[1]], |[px, py, qx, qy, rx, ry]| {

@@ -1,4 +1,4 @@
-//! Measures how much pictures change with every value of every Gaussian.
+//! Measures the sensitivity of pictures to every value of every Gaussian.
 
 use lexisplat::simd::Simd;
 use lexisplat::{Progress, Sensitivity, Stage};
@@ -14,13 +14,13 @@ use super::moments::{self, Moments};
 use super::project::Projection;
 use super::workspace::Workspace;
 
-/// Returns how much the pictures of `scene` from `cameras`, over black, change with each value of each
-/// Gaussian, averaged over the views. Every view has the same weight, whatever its size.
+/// Returns the sensitivity of the pictures of `scene` from `cameras`, over black, to each value of each Gaussian,
+/// averaged over the views. Every view has the same weight, whatever its size.
 ///
-/// If every value has an independent small error, the expected mean squared error of the pictures is the
-/// sum of the sensitivities times the squared errors.
+/// If every value has an independent small error, the expected mean squared error of the pictures is the sum of the
+/// sensitivities times the squared errors.
 ///
-/// Reports the stage [`Stage::Draw`], in views, to `progress`, and asks it before each view whether to stop.
+/// Reports the stage [`Stage::Draw`] to `progress`, in views, and asks it before each view whether to stop.
 ///
 /// # Errors
 /// [`Error::Codec`](crate::Error::Codec) if `progress` cancelled the work; otherwise as [`crate::render`].
@@ -43,7 +43,7 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progres
     Ok(total)
 }
 
-/// Adds the moments of one view to `sums`, one for each Gaussian.
+/// Adds the moments of one view to `sums`, which has one entry for each Gaussian.
 fn measure(
     sums: &mut [Moments],
     workspace: &mut Workspace,

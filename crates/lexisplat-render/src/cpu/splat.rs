@@ -1,7 +1,7 @@
 //! A Gaussian on screen.
 
-/// A Gaussian on screen. It fills one line of the cache, since tiles read splats in the order of depth, which is none
-/// in memory.
+/// A Gaussian on screen. It fills one cache line, because tiles read splats in the order of depth, which is not their
+/// order in memory.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(align(64))]
 pub(super) struct Splat {
@@ -13,18 +13,19 @@ pub(super) struct Splat {
     pub(super) opacity: f32,
     /// Colour towards the camera, not below 0.
     pub(super) colour: [f32; 3],
-    /// Powers below this give an opacity below [`ALPHA_MIN`](crate::conventions::ALPHA_MIN) for sure.
+    /// Smallest power that counts. Lower powers certainly give an opacity below
+    /// [`ALPHA_MIN`](crate::conventions::ALPHA_MIN).
     pub(super) cutoff: f32,
-    /// The pixels that it may touch.
+    /// The pixels that the splat may touch.
     pub(super) pixels: PixelRect,
     /// The yy of the covariance, in square pixels.
     pub(super) variance_y: f32,
-    /// Its index in the scene.
+    /// Index of the Gaussian in the scene.
     pub(super) gaussian: u32,
 }
 
 impl Splat {
-    /// The root of its conic.
+    /// Returns the root of the splat's conic.
     #[inline(always)]
     pub(super) fn root(&self) -> Root {
         Root::of_conic(self.conic, self.variance_y)
@@ -39,7 +40,7 @@ pub(super) struct PixelRect {
 }
 
 impl PixelRect {
-    /// The same as two words.
+    /// Returns the rectangle as two words.
     pub(super) fn to_words(self) -> (u32, u32) {
         let word = |[column, row]: [u16; 2]| u32::from(column) | u32::from(row) << u16::BITS;
         (word(self.min), word(self.max))
@@ -52,22 +53,23 @@ impl PixelRect {
     }
 }
 
-/// The upper triangular root R of a conic, `R^T R`: xx, xy, yy. `R (centre - pixel)` is the offset in standard
-/// deviations, so that products of it neither grow with a Gaussian's size nor cancel in thin ones.
+/// The upper triangular root R of a conic, where the conic is `R^T R`: xx, xy, yy. `R (centre - pixel)` is the offset in
+/// standard deviations. Products of this offset therefore neither grow with the size of a Gaussian nor cancel in thin
+/// Gaussians.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Root(pub(super) [f32; 3]);
 
 impl Root {
-    /// The root of a conic whose covariance has `variance_y` as its yy.
+    /// Returns the root of a conic. `variance_y` is the yy of the covariance.
     #[inline(always)]
     pub(super) fn of_conic(conic: [f32; 3], variance_y: f32) -> Self {
         let [xx, xy, _] = conic;
         let root = xx.sqrt();
-        // The last element squared is the determinant over xx. The variance gives it without cancellation.
+        // The square of the last element is the determinant divided by xx. `variance_y` gives it without cancellation.
         Self([root, xy / root, 1.0 / variance_y.sqrt()])
     }
 
-    /// `R v`.
+    /// Returns `R v`.
     #[inline(always)]
     pub(super) fn of(&self, v: [f32; 2]) -> [f32; 2] {
         let [xx, xy, yy] = self.0;

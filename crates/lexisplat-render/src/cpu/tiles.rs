@@ -1,4 +1,4 @@
-//! Lists for every tile the splats that may touch it.
+//! Lists the splats that may touch each tile.
 
 use std::ops::Range;
 
@@ -8,19 +8,19 @@ use super::grid::{ChosenTiles, Grid};
 use super::order::Order;
 use super::splat::PixelRect;
 
-/// Pieces that the sorted splats are cut into. One task lists each piece, and a tile's list is those of the pieces
-/// in order.
+/// Number of pieces of the sorted splats. Each piece is listed by one task, and the list of a tile consists of the lists
+/// of the pieces in order.
 const PIECES: usize = 8;
-/// Most list entries in memory at once, unless one row of tiles has more: 16 MB.
+/// Largest number of list entries in memory at once, unless one row of tiles has more: 16 MB.
 pub(super) const MAX_ENTRIES: u64 = 1 << 22;
 
-/// Cuts the rows of tiles into bands. The lists of a band have at most `max_entries` entries, unless it is one
+/// Cuts the rows of tiles into bands. The lists of a band have at most `max_entries` entries, unless the band is a single
 /// row.
 pub(super) fn bands(order: &Order, grid: Grid, max_entries: u64) -> Vec<Range<usize>> {
-    // Differences of the number of entries from one row of tiles to the next.
+    // Differences between the numbers of entries of consecutive rows of tiles.
     let mut steps = vec![0_i64; grid.rows + 1];
     for (_, rect) in order.splats(0..order.keys.len()) {
-        // At most 1024.
+        // The number of columns is at most 1024.
         let columns = i64::try_from(rect.columns().len()).unwrap_or(i64::MAX);
         let rows = rect.rows();
         steps[rows.start] += columns;
@@ -43,13 +43,13 @@ pub(super) fn bands(order: &Order, grid: Grid, max_entries: u64) -> Vec<Range<us
     bands
 }
 
-/// For each tile of a band, the splats that may touch it, in order.
+/// The splats that may touch each tile of a band, in order.
 #[derive(Debug, Default)]
 pub(super) struct TileLists {
     pieces: Vec<Piece>,
 }
 
-/// The lists of one piece of the splats. That of tile `t` is `entries[starts[t]..starts[t + 1]]`.
+/// The lists of one piece of the splats. The list of tile `t` is `entries[starts[t]..starts[t + 1]]`.
 #[derive(Debug, Default)]
 struct Piece {
     starts: Vec<usize>,
@@ -57,8 +57,8 @@ struct Piece {
 }
 
 impl TileLists {
-    /// Lists the splats over the rows of tiles in `band`, in place of the lists before. Lists of tiles that are not `chosen`
-    /// are empty.
+    /// Lists the splats for the rows of tiles in `band`, and overwrites the old lists. Lists of tiles that are not
+    /// `chosen` are empty.
     pub(super) fn fill(
         &mut self,
         order: &Order,
@@ -83,7 +83,7 @@ impl TileLists {
         });
     }
 
-    /// Number of splats in the list of tile `tile` of the band.
+    /// Returns the number of splats in the list of tile `tile` of the band.
     pub(super) fn len(&self, tile: usize) -> usize {
         self.pieces.iter().map(|p| p.starts[tile + 1] - p.starts[tile]).sum()
     }
@@ -94,7 +94,7 @@ impl TileLists {
     }
 }
 
-/// The list of one tile, in pieces: slots of splats.
+/// The list of one tile: slots of splats, in pieces.
 pub(super) struct List<'a> {
     pieces: std::slice::Iter<'a, Piece>,
     tile: usize,
@@ -129,8 +129,8 @@ impl Piece {
                 .filter(move |tile| wanted(*tile))
         };
         let Self { starts, entries } = self;
-        // Tile t is counted at `t + 2`. After the sums its list begins at `starts[t + 1]`, and filling the list
-        // moves that to its end.
+        // Tile t is counted at `t + 2`. After the prefix sums its list begins at `starts[t + 1]`. Filling the list moves
+        // that number to the end of the list.
         starts.clear();
         starts.resize(band.len() * grid.columns + 2, 0);
         for (_, rect) in order.splats(range.clone()) {
@@ -140,7 +140,7 @@ impl Piece {
             starts[tile] += starts[tile - 1];
         }
         let len = starts.last().copied().unwrap_or(0);
-        // Views differ in what they need, and doubling would take too much.
+        // Views differ in the number of entries, and doubling would take too much memory.
         entries.reserve_exact(len.saturating_sub(entries.len()));
         entries.resize(len, 0);
         for (slot, rect) in order.splats(range) {

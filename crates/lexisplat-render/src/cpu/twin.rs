@@ -1,4 +1,4 @@
-//! The steps of this renderer, one by one, for tests of the GPU to compare with.
+//! The steps of this renderer one by one, for comparison with the GPU in tests.
 
 use lexisplat::simd::Simd;
 
@@ -20,16 +20,16 @@ pub(crate) struct Seen {
     pub(crate) conic: [f32; 3],
     pub(crate) opacity: f32,
     pub(crate) colour: [f32; 3],
-    /// Bits of the view-space z.
+    /// Bits of the view-space z, as an integer.
     pub(crate) depth: u32,
-    /// INRIA's tiles: the first, and the first after the last, as (column, row).
+    /// INRIA's tiles: the first tile, and the first tile after the last, as (column, row).
     pub(crate) tiles: [[u16; 2]; 2],
 }
 
-/// Powers above this are within the range of `exp`.
+/// A cutoff within the range of `exp`.
 const CUTOFF: f32 = -80.0;
 
-/// Returns what INRIA's rules draw, with the nearest first.
+/// Returns the Gaussians that INRIA's rules draw, the nearest first.
 pub(crate) fn seen(scene: &Scene<'_>, camera: &Camera) -> Vec<Seen> {
     let projection = Projection::new(camera, scene.meta().antialiased).untightened();
     let mut workspace = Workspace::default();

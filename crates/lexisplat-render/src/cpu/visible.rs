@@ -12,22 +12,24 @@ use super::math::whole;
 use super::project::{Body, Projection};
 use super::splat::{PixelRect, Splat};
 
-/// Gaussians that one task projects, or carries changes over to.
+/// Number of Gaussians that one task projects, or carries changes over to.
 pub(super) const GAUSSIANS_PER_TASK: usize = 1024;
 
-/// The Gaussians that may be visible, in order of index: the first few of each [`GAUSSIANS_PER_TASK`] slots.
+/// The Gaussians that may be visible, in order of index. They are the first few of each [`GAUSSIANS_PER_TASK`] slots.
 ///
-/// One allocation holds all of them. Many small ones from many threads would not be returned to the system.
+/// One allocation holds all slots. Many small allocations from many threads would not be returned to the system.
 #[derive(Debug, Default)]
 pub(super) struct Visible {
     pub(super) slots: Vec<Splat>,
-    /// The pixels that each slot may touch. Listing reads nothing else, and slots are many times as large.
+    /// The pixels that each slot may touch. They are apart from the slots, because listing reads nothing else, and slots
+    /// are many times as large.
     rects: Vec<PixelRect>,
 }
 
 impl Visible {
-    /// Projects all Gaussians, in place of those of the picture before. Of `clusters`, if there are some, it leaves out those
-    /// that the picture cannot show. Replaces `keys` by (depth, slot) of those that may be visible, in order of index.
+    /// Projects all Gaussians, and overwrites those of the last picture. Clusters that the picture cannot show are
+    /// skipped, if there are `clusters`. Replaces `keys` by the (depth, slot) of the Gaussians that may be visible, in
+    /// order of index.
     pub(super) fn project(
         &mut self,
         keys: &mut Vec<(u32, u32)>,
@@ -63,15 +65,15 @@ impl Visible {
         keys.truncate(len);
     }
 
-    /// The pixels that a slot may touch.
+    /// Returns the pixels that a slot may touch.
     pub(super) fn rect(&self, slot: u32) -> PixelRect {
         self.rects[slot as usize]
     }
 }
 
-/// What Gaussians that follow one another are projected to.
+/// The projections of consecutive Gaussians.
 struct Task<'a> {
-    /// Index of the first Gaussian, and of the first slot.
+    /// Index of the first Gaussian, which is also the index of the first slot.
     first: usize,
     slots: &'a mut [Splat],
     rects: &'a mut [PixelRect],
@@ -79,7 +81,7 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Projects as many Gaussians as there are slots. Returns how many slots were filled.
+    /// Projects as many Gaussians as there are slots. Returns the number of slots that were filled.
     #[inline(always)]
     fn project(
         &mut self,
@@ -118,7 +120,8 @@ impl Task<'_> {
                     continue;
                 }
                 rects[count] = pixels;
-                // Depths are positive, so their bits are in the order of the numbers. Gaussians are counted in u32.
+                // Depths are positive, so the order of their bits is the order of their values. Indices of Gaussians fit
+                // in `u32`.
                 let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
                 keys[count] = (placed.depth[lane].to_bits(), index(first + count));
                 slots[count] = Splat {

@@ -1,4 +1,4 @@
-//! The memory of pictures of one scene, kept from one to the next.
+//! Memory for the pictures of one scene, which is kept from one picture to the next.
 
 use lexisplat::Geometry;
 use lexisplat::simd::Simd;
@@ -12,8 +12,8 @@ use super::project::Projection;
 use super::tiles::TileLists;
 use super::visible::Visible;
 
-/// What drawing a picture makes on the way, about 90 bytes for each Gaussian. The next picture overwrites it, but for the
-/// clusters, which are those of the scene.
+/// Intermediate results of drawing a picture, about 90 bytes for each Gaussian. The next picture overwrites everything
+/// but the clusters, which belong to the scene.
 #[derive(Debug, Default)]
 pub(crate) struct Workspace {
     pub(super) visible: Visible,
@@ -23,12 +23,12 @@ pub(crate) struct Workspace {
 }
 
 impl Workspace {
-    /// The memory of many pictures of a scene.
+    /// Returns memory for many pictures of a scene.
     pub(super) fn of_scene(geometry: &Geometry) -> Self {
         Self { clusters: Some(Clusters::of(geometry)), ..Self::default() }
     }
 
-    /// Makes clusters, unless this is for the first picture. All pictures must be of the scene that `geometry` is of.
+    /// Makes clusters, unless this is the first picture. All pictures must be of the scene of `geometry`.
     pub(crate) fn cluster_again(&mut self, geometry: &Geometry) {
         let drawn_before = !self.visible.slots.is_empty();
         if drawn_before && self.clusters.is_none() {
@@ -36,7 +36,7 @@ impl Workspace {
         }
     }
 
-    /// Projects what a picture of `scene` may show.
+    /// Projects the Gaussians that a picture of `scene` may show.
     pub(super) fn project(&mut self, scene: &Scene<'_>, radiance: &Radiance<'_>, projection: &Projection) {
         let (keys, geometry) = (&mut self.order.keys, scene.geometry());
         let clusters = self.clusters.as_ref().filter(|clusters| clusters.len() == geometry.len());

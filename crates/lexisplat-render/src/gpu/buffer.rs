@@ -1,4 +1,4 @@
-//! Buffers whose bytes are counted while they live.
+//! GPU buffers. Their bytes are counted while they exist.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -10,9 +10,9 @@ use crate::error::{Error, Result};
 
 use super::device::Gpu;
 
-/// Smallest size of a buffer in bytes: that of the largest type in a binding.
+/// Smallest size of a buffer, in bytes: the size of the largest type in a binding.
 const MIN_BUFFER: u64 = 256;
-/// Bytes uploaded at once. wgpu holds a copy of each piece until the GPU has read it.
+/// Number of bytes uploaded at once. wgpu holds a copy of each piece until the GPU has read it.
 const UPLOAD_PIECE: usize = 32 << 20;
 
 /// A buffer on the GPU.
@@ -28,7 +28,7 @@ impl Buffer {
     }
 }
 
-/// Bytes on the GPU, counted until this is dropped.
+/// Bytes on the GPU. They are counted until this value is dropped.
 #[derive(Debug)]
 pub(super) struct Counted {
     pub(super) size: u64,
@@ -49,12 +49,12 @@ impl Drop for Counted {
     }
 }
 
-/// Buffers are made without waiting. What the device has against one is reported by the
-/// [`checked`](Gpu::checked) around it.
+/// These methods make buffers without waiting. The [`checked`](Gpu::checked) call around them reports what the device
+/// refuses.
 impl Gpu {
     /// Makes a buffer of at least `size` bytes.
     pub(super) fn buffer(&self, label: &str, size: u64, usage: Usages) -> Result<Buffer> {
-        // WebGPU refuses empty bindings, and copies whole words.
+        // WebGPU refuses empty bindings, and copies only whole words.
         let size = size.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT).max(MIN_BUFFER);
         let limit = self.limits().max_buffer_size;
         if size > limit {
@@ -65,24 +65,24 @@ impl Gpu {
         Ok(Buffer { raw: self.device().create_buffer(&descriptor), counted: self.count(size) })
     }
 
-    /// Makes a buffer that kernels read and write, and that can be copied from and to.
+    /// Makes a buffer that kernels read and write. It can be copied from and to.
     pub(super) fn storage(&self, label: &str, size: u64) -> Result<Buffer> {
         self.buffer(label, size, Usages::STORAGE | Usages::COPY_DST | Usages::COPY_SRC)
     }
 
-    /// Makes a buffer that can be copied to and read back.
+    /// Makes a buffer that can be copied to and then read by the processor.
     pub(super) fn readable(&self, label: &str, size: u64) -> Result<Buffer> {
         self.buffer(label, size, Usages::MAP_READ | Usages::COPY_DST)
     }
 
-    /// Makes a small buffer of uniforms.
+    /// Makes a small buffer for uniforms.
     pub(super) fn uniform<T: Pod>(&self, label: &str, value: &T) -> Result<Buffer> {
         let buffer = self.buffer(label, size_of::<T>() as u64, Usages::UNIFORM | Usages::COPY_DST)?;
         self.queue().write_buffer(&buffer.raw, 0, bytemuck::bytes_of(value));
         Ok(buffer)
     }
 
-    /// Makes a buffer for kernels to read, with `words` in it.
+    /// Makes a buffer with the contents `words`, for kernels to read.
     pub(super) async fn upload<T: Pod>(&self, label: &str, words: &[T]) -> Result<Buffer> {
         let bytes: &[u8] = bytemuck::cast_slice(words);
         let buffer = self.checked(label, || self.storage(label, bytes.len() as u64)).await?;
@@ -90,8 +90,8 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// Copies `bytes`, of whole words, to `buffer` from byte `first` on. Of large uploads the GPU reads each piece
-    /// before the next is handed over, so that the copies that wgpu holds do not pile up.
+    /// Copies `bytes`, which are whole words, to `buffer` from byte `first` on. In a large upload the GPU reads each
+    /// piece before the next piece is handed over, so that the copies held by wgpu do not accumulate.
     pub(super) async fn write(&self, buffer: &Buffer, first: u64, bytes: &[u8]) -> Result<()> {
         for (piece, at) in bytes.chunks(UPLOAD_PIECE).zip((first..).step_by(UPLOAD_PIECE)) {
             self.queue().write_buffer(&buffer.raw, at, piece);
@@ -103,20 +103,20 @@ impl Gpu {
         Ok(())
     }
 
-    /// Makes what records work for the queue.
+    /// Makes an encoder, which records work for the queue.
     pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
         self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
-    /// The first `size` bytes of a [`readable`](Self::readable) buffer, once all submitted work is done.
+    /// Returns the first `size` bytes of a [`readable`](Self::readable) buffer, once all submitted work is done.
     pub(super) async fn read<T: Pod>(&self, buffer: &Buffer, size: u64) -> Result<Vec<T>> {
         let values = super::readback::read_async(&buffer.raw, size).await;
-        // What the device had against the work explains why mapping failed.
+        // An error of the submitted work explains why mapping failed, so it is returned first.
         self.take_failure()?;
         values
     }
 
-    /// Copies all of a buffer made by [`Self::storage`] and reads it.
+    /// Copies a buffer made by [`Self::storage`] to the processor.
     #[cfg(test)]
     pub(super) fn read_back<T: Pod>(&self, buffer: &Buffer) -> Vec<T> {
         super::readback::read_buffer(self.device(), self.queue(), &buffer.raw).unwrap()

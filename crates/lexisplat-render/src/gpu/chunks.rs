@@ -1,4 +1,4 @@
-//! Chunks: the parts of a scene on the GPU, cut where their arrays do not fit in a binding.
+//! Chunks: the pieces of a scene's parts on the GPU. Parts are cut where their arrays do not fit in a binding.
 
 use std::ops::Range;
 
@@ -10,45 +10,44 @@ use super::device::Gpu;
 use super::part::{ScenePart, word, words};
 use super::part_layout::{Section, ShKind};
 
-/// Words of the place and the counts of a group of Gaussians.
+/// Number of words for the place and the counts of a group of Gaussians.
 const GROUP_WORDS: usize = COLUMN_WORDS as usize;
 
-/// The buffers of a run of Gaussians, and what kernels are told about them.
+/// The buffers of a run of Gaussians, and the numbers that describe them to kernels.
 #[derive(Debug)]
 pub(super) struct ChunkBuffers {
     /// Number of Gaussians.
     pub(super) count: u32,
     pub(super) escapes: u32,
-    /// Where in the columns the numbers of the escaped Gaussians begin.
+    /// Place in the columns where the numbers of the escaped Gaussians begin.
     pub(super) escapes_at: u32,
-    /// Where in the nonzeros their exact rows begin.
+    /// Place in the nonzeros where the exact rows of the escaped Gaussians begin.
     pub(super) exact_at: u32,
     pub(super) bodies: Buffer,
     pub(super) shapes: Buffer,
-    /// What the radiance kernel has from binding 6 on: dense rows; or base colours, columns and nonzeros.
+    /// Buffers of the radiance kernel from binding 6 on: dense rows; or base colours, columns and nonzeros.
     pub(super) sh: Vec<Buffer>,
 }
 
 impl ChunkBuffers {
-    /// Number of blocks; the last may be short.
+    /// Returns the number of blocks. The last block may be short.
     pub(super) fn blocks(&self) -> u32 {
         self.count.div_ceil(GROUP)
     }
 }
 
-/// A run of a part's Gaussians.
+/// A run of consecutive Gaussians of a part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Cut {
     pub(super) gaussians: Range<usize>,
-    /// Their words of nonzeros.
+    /// Words of the nonzeros of these Gaussians.
     words: Range<usize>,
-    /// Their escapes.
+    /// Escapes of these Gaussians.
     escapes: Range<usize>,
 }
 
 impl ScenePart<'_> {
-    /// Cuts the part into runs. Each array of a run fits in `limit` bytes, and all runs but the last are whole
-    /// blocks.
+    /// Cuts the part into runs. Each array of a run fits in `limit` bytes. All runs but the last consist of whole blocks.
     pub(super) fn cuts(&self, limit: u64) -> Result<Vec<Cut>> {
         let (len, block) = (self.len() as usize, GROUP as usize);
         let mut cuts: Vec<Cut> = Vec::new();
@@ -74,7 +73,8 @@ impl ScenePart<'_> {
         Ok(cuts)
     }
 
-    /// The run of the Gaussians in `range`, which begins with a block and ends with one or with the part.
+    /// Returns the run of the Gaussians in `range`, which begins at the start of a block and ends at the end of a block
+    /// or of the part.
     fn run(&self, range: Range<usize>) -> Cut {
         let columns = self.section(Section::Columns);
         let place = |i: usize| {
@@ -94,7 +94,7 @@ impl ScenePart<'_> {
         }
     }
 
-    /// Bytes of the largest array of a run.
+    /// Returns the number of bytes of the largest array of a run.
     fn largest_array(&self, cut: &Cut) -> u64 {
         let [n, words, escapes] = [cut.gaussians.len(), cut.words.len(), cut.escapes.len()].map(|v| v as u64);
         let layout = self.outline.layout;
@@ -154,7 +154,8 @@ impl ScenePart<'_> {
         })
     }
 
-    /// The places and counts of a run, then the numbers of its escaped Gaussians, counted from its start.
+    /// Returns the places and counts of a run, then the numbers of its escaped Gaussians, counted from the start of the
+    /// run.
     fn columns(&self, cut: &Cut) -> Vec<u32> {
         let group = COLUMN_GROUP as usize;
         let groups = cut.gaussians.start / group..cut.gaussians.end.div_ceil(group);

@@ -1,10 +1,10 @@
-//! Sparse codes as kernels read them.
+//! Sparse codes in the layout that kernels read.
 //!
-//! For every group of [`COLUMN_GROUP`] Gaussians, `columns` holds the word of `nonzeros` at which the group's
-//! codes begin, and a byte for each Gaussian: its number of nonzeros, or [`ESCAPED`]. From that word on,
-//! `nonzeros` holds the group's atom numbers, of one or two bytes each, then its values, of two or four bytes
-//! each. Both are filled up to whole words. Neighbouring Gaussians share cache lines this way, and offsets cost
-//! a quarter of a byte for each Gaussian.
+//! For every group of [`COLUMN_GROUP`] Gaussians, `columns` holds the word of `nonzeros` at which the codes of the group
+//! begin, and a byte for each Gaussian: its number of nonzeros, or [`ESCAPED`]. From that word on, `nonzeros` holds the
+//! atom numbers of the group, of one or two bytes each, then its values, of two or four bytes each. Both are padded to
+//! whole words. Neighbouring Gaussians therefore share cache lines, and offsets cost a quarter of a byte for each
+//! Gaussian.
 
 use std::ops::Range;
 
@@ -15,14 +15,14 @@ use super::constants::{COLUMN_GROUP, ESCAPED};
 /// The codes of a run of Gaussians.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
-    /// Places and counts.
+    /// Places and counts of the groups.
     pub(super) columns: Vec<u32>,
     /// The numbers of the escaped Gaussians within the run.
     pub(super) escaped: Vec<u32>,
     pub(super) nonzeros: Vec<u32>,
 }
 
-/// Returns which of the escapes are of Gaussians in `range`.
+/// Returns the range of the escapes that belong to Gaussians in `range`.
 pub(super) fn escapes_in(codes: &SparseCodes, range: &Range<usize>) -> Range<usize> {
     let before = |end: usize| codes.escapes().gaussians.partition_point(|&g| (g as usize) < end);
     before(range.start)..before(range.end)
@@ -31,7 +31,7 @@ pub(super) fn escapes_in(codes: &SparseCodes, range: &Range<usize>) -> Range<usi
 impl Columns {
     /// Lays out the codes of the Gaussians in `range`, which begin at nonzero `first`.
     pub(super) fn new(codes: &SparseCodes, range: Range<usize>, first: usize) -> Self {
-        // Chunks are smaller than 2^32.
+        // Chunks have fewer than 2^32 Gaussians.
         let first_gaussian = u32::try_from(range.start).unwrap_or(u32::MAX);
         let escapes: Vec<u32> =
             codes.escapes().gaussians[escapes_in(codes, &range)].iter().map(|g| g - first_gaussian).collect();
@@ -65,7 +65,7 @@ impl Columns {
     }
 }
 
-/// Appends elements to `words`, and fills the last word up with zeros.
+/// Appends elements to `words`, and pads the last word with zeros.
 fn pack<const N: usize>(words: &mut Vec<u32>, elements: impl Iterator<Item = [u8; N]>) {
     let mut word = 0;
     let mut filled = 0;

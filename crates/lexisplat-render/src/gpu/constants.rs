@@ -1,5 +1,5 @@
-//! Numbers that kernels and host share. They stand here or in `conventions`, and are put in front of every
-//! kernel's text.
+//! Numbers that kernels and host share. They are defined here or in `conventions`, and are inserted before the text of
+//! every kernel.
 
 use std::fmt::Write as _;
 
@@ -11,104 +11,105 @@ use crate::conventions::{
 };
 use crate::cpu::SUMS;
 
-/// Lanes of a workgroup, and Gaussians of a block. Every adapter offers as many (WebGPU's
+/// Number of lanes of a workgroup, and of Gaussians of a block. Every adapter supports as many (WebGPU's
 /// `maxComputeInvocationsPerWorkgroup`).
 pub(super) const GROUP: u32 = 256;
-/// Most workgroups in one dimension of a dispatch (WebGPU's `maxComputeWorkgroupsPerDimension`).
+/// Largest number of workgroups in one dimension of a dispatch (WebGPU's `maxComputeWorkgroupsPerDimension`).
 pub(super) const MAX_GROUPS: u32 = 65_535;
-/// Numbers that a lane adds up in a scan.
+/// Number of values that a lane adds up in a scan.
 const SCAN_ITEMS: u32 = 8;
-/// Numbers that a workgroup scans.
+/// Number of values that a workgroup scans.
 pub(super) const SCAN_BLOCK: u32 = GROUP * SCAN_ITEMS;
-/// Bits of a key sorted in one pass.
+/// Number of bits of a key that one pass sorts by.
 pub(super) const DIGIT_BITS: u32 = 4;
-/// Values of a digit.
+/// Number of values of a digit.
 pub(super) const DIGITS: u32 = 1 << DIGIT_BITS;
-/// Keys that a lane sorts. With [`GROUP`] lanes, counts fit in 16 bits.
+/// Number of keys that a lane sorts. With [`GROUP`] lanes counts fit in 16 bits.
 const SORT_ITEMS: u32 = 8;
-/// Keys that a workgroup sorts.
+/// Number of keys that a workgroup sorts.
 pub(super) const SORT_BLOCK: u32 = GROUP * SORT_ITEMS;
-/// Splats whose moments a workgroup sums together.
+/// Number of splats whose moments a workgroup sums together.
 const MOMENT_SPLATS: u32 = 4;
-/// Splats that a workgroup reads at once for that. With the sums this just fits in workgroup memory.
+/// Number of splats that a workgroup reads at once to sum moments. With the sums they just fit in workgroup memory.
 const MOMENT_BATCH: u32 = 64;
-/// Gaussians whose codes share one stored place.
+/// Number of Gaussians whose codes share one stored place.
 pub(super) const COLUMN_GROUP: u32 = 16;
-/// Words for these Gaussians: the place, and a byte for each.
+/// Number of words for such a group: the place, and a byte for each Gaussian.
 pub(super) const COLUMN_WORDS: u32 = 1 + COLUMN_GROUP / 4;
-/// Stands in the byte of a Gaussian that is stored exactly. Other bytes are counts, which are at most 72.
+/// Value of the byte of a Gaussian that is stored exactly. Other bytes are counts, which are at most 72.
 pub(super) const ESCAPED: u32 = 0x80;
-/// Bins for counts of nonzeros: a power of two above the largest count, 72.
+/// Number of bins for counts of nonzeros: a power of two above the largest count, 72.
 const COUNT_BINS: u32 = 128;
-/// Texels along a side of a face of the table of atom radiance. Tests of `gpu::radiance_table` measure the
+/// Number of texels along a side of a face of the table of atom radiance. Tests of `gpu::radiance_table` measure the
 /// error.
 pub(super) const TABLE_SIDE: u32 = 32;
 /// Relative slack of the coarse test in `cull`, far above its rounding errors.
 const CULL_SLACK: f32 = 1e-3;
-/// Relative slack of an ellipse's extent when tiles are chosen, far above its rounding errors.
+/// Relative slack of an ellipse's extent in the choice of tiles, far above its rounding errors.
 const REACH_SLACK: f32 = 1e-3;
-/// The same in pixels.
+/// Absolute slack of an ellipse's extent in the choice of tiles, in pixels.
 const REACH_MARGIN: f32 = 0.05;
-/// Pixels that a lane compares.
+/// Number of pixels that a lane compares.
 pub(super) const ERROR_PIXELS: u32 = 16;
-/// Rounds in one measurement of arithmetic.
+/// Number of rounds in one measurement of arithmetic.
 pub(super) const MULTIPLY_ADDS: u32 = 1024;
-/// Larger numbers count as overflown.
+/// Largest number that does not count as an overflow.
 const FAR_LIMIT: f32 = 3e38;
 
-/// Stands for a colour that overflows. Other colours are not negative.
+/// Value of a colour that overflows. Other colours are not negative.
 const NO_COLOUR: f32 = -1.0;
 
-/// Numbers that the GPU counts, as places in the buffer of counters.
+/// Numbers that the GPU counts. Their values are places in the buffer of counters.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counter {
-    /// Gaussians that may be visible; those of the fullest band if bands look for their own.
+    /// Number of Gaussians that may be visible. If each band searches for its own Gaussians: that number in the fullest
+    /// band.
     Found,
-    /// Those that have slots: all that the buffers hold.
+    /// Number of Gaussians that have slots, at most what the buffers hold.
     Slots,
-    /// [`Self::Slots`] plus one.
+    /// The number [`Self::Slots`] plus one.
     SlotsAndEnd,
-    /// Blocks in which slots are sorted.
+    /// Number of blocks in which slots are sorted.
     SlotBlocks,
-    /// Numbers in the histogram of that sort.
+    /// Number of values in the histogram of the sort of slots.
     SlotDigits,
-    /// Entries of the band's tile lists, as far as the buffers hold them.
+    /// Number of entries in the tile lists of the band, at most what the buffers hold.
     Entries,
-    /// Blocks in which entries are sorted.
+    /// Number of blocks in which entries are sorted.
     EntryBlocks,
-    /// Numbers in the histogram of that sort.
+    /// Number of values in the histogram of the sort of entries.
     EntryDigits,
-    /// Entries of the fullest band, whether the buffers hold them or not.
+    /// Number of entries of the fullest band, which may be more than the buffers hold.
     EntriesMost,
-    /// Entries of all bands.
+    /// Number of entries of all bands together.
     EntriesAll,
 }
 
-/// Words of the buffer of counters.
+/// Number of words of the buffer of counters.
 pub(super) const COUNTERS: usize = 16;
 
-/// Dispatches whose sizes the GPU works out, as places in the buffer of their arguments.
+/// Dispatches whose sizes the GPU computes. Their values are places in the buffer of their arguments.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Dispatch {
-    /// One lane for each slot, and one more.
+    /// A lane for each slot, and one more lane.
     SlotsAndEnd,
     /// Groups that sort slots.
     SlotBlocks,
-    /// Groups that scan that sort's histogram.
+    /// Groups that scan the histogram of the sort of slots.
     SlotDigits,
-    /// Groups that scan numbers of slots.
+    /// Groups that scan one number for each slot.
     SlotScan,
-    /// One lane for each entry.
+    /// A lane for each entry.
     Entries,
     /// Groups that sort entries.
     EntryBlocks,
-    /// Groups that scan that sort's histogram.
+    /// Groups that scan the histogram of the sort of entries.
     EntryDigits,
-    /// One lane for each slot of the first chunk. The dispatches of the other chunks follow.
+    /// A lane for each slot of the first chunk. The dispatches of the other chunks follow.
     Chunks,
 }
 
-/// Declarations of everything above and of the conventions, in WGSL.
+/// Returns WGSL declarations of all numbers above and of the conventions.
 pub(super) fn declarations() -> String {
     let mut out = String::new();
     let mut line = |text: String| {
@@ -138,7 +139,7 @@ pub(super) fn declarations() -> String {
         ("COUNT_BINS", COUNT_BINS),
         ("TABLE_SIDE", TABLE_SIDE),
         ("MOMENT_SUMS", sums),
-        // The sums, and a maximum.
+        // The number of sums, and one for the maximum.
         ("MOMENTS", sums + 1),
         ("MOMENT_SPLATS", MOMENT_SPLATS),
         ("MOMENT_BATCH", MOMENT_BATCH),
@@ -200,7 +201,7 @@ pub(super) fn declarations() -> String {
     out
 }
 
-/// Coefficients, of three channels each, that three vectors of four floats hold.
+/// Number of coefficients of three channels each that three vectors of four floats hold.
 const QUAD: usize = 4;
 
 /// Returns the number of vectors of four floats that hold `coefficients` of three channels each.
@@ -208,8 +209,9 @@ pub(super) fn vectors(coefficients: usize) -> usize {
     3 * coefficients.div_ceil(QUAD)
 }
 
-/// Returns statements that read `coefficients` of three channels from vectors of four floats. `load` makes an
-/// expression from a vector's place; `each` makes a statement from a coefficient's number and expression.
+/// Returns statements that read `coefficients` coefficients of three channels from vectors of four floats. `load` makes
+/// an expression from the place of a vector. `each` makes a statement from the number and the expression of a
+/// coefficient.
 fn for_each_coefficient(
     coefficients: usize,
     load: impl Fn(usize) -> String,
@@ -219,7 +221,7 @@ fn for_each_coefficient(
     for group in 0..coefficients.div_ceil(QUAD) {
         let [a, b, c] = [3 * group, 3 * group + 1, 3 * group + 2];
         for v in [a, b, c] {
-            // Writing to a String does not fail.
+            // Writing to a `String` does not fail.
             let _ = writeln!(out, "let v{v} = {};", load(v));
         }
         let expressions = [
@@ -235,7 +237,8 @@ fn for_each_coefficient(
     out
 }
 
-/// Returns statements that read `dc` from a dense row and add the products of the rest with the basis to `rest`.
+/// Returns statements that read `dc` from a dense row, and add the products of the other coefficients with the basis to
+/// `rest`.
 pub(super) fn dense_terms(per_channel: usize, load: impl Fn(usize) -> String) -> String {
     for_each_coefficient(per_channel + 1, load, |k, coefficient| match k {
         0 => format!("let dc = {coefficient};"),
@@ -246,14 +249,14 @@ pub(super) fn dense_terms(per_channel: usize, load: impl Fn(usize) -> String) ->
 /// Returns statements that add the products of the atom at `atoms[at]` with the basis to `sum`.
 pub(super) fn atom_terms(per_channel: usize) -> String {
     if per_channel == 0 {
-        // The array is bound even so, and a kernel must name what is bound.
+        // The array is bound at degree 0 too, and a kernel must use everything that is bound.
         return "_ = atoms[at];".to_owned();
     }
     let load = |v: usize| format!("atoms[at + {v}u]");
     for_each_coefficient(per_channel, load, |k, coefficient| format!("sum += b[{k}] * {coefficient};"))
 }
 
-/// Returns the statements of [`atom_terms`] for a row whose floats `load` reads.
+/// Returns the statements of [`atom_terms`] for a row whose floats are read by `load`.
 pub(super) fn float_terms(per_channel: usize, load: impl Fn(usize) -> String) -> String {
     let mut out = String::new();
     for k in 0..per_channel {

@@ -1,4 +1,4 @@
-//! Finding a GPU, and what it can hold.
+//! Finds a GPU and its limits.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,21 +9,21 @@ use crate::wait::answer;
 
 use super::buffer::Counted;
 
-/// What to install or use where no adapter is found.
+/// Advice for a machine without an adapter.
 const NO_ADAPTER: &str = "no GPU adapter was found; install a Vulkan driver and loader (Debian and Ubuntu: mesa-vulkan-drivers and libvulkan1), or draw with the CPU renderer";
 
 /// An adapter that this machine offers.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct AdapterSummary {
-    /// Its place in the list, best first: the number that [`Device::Index`] takes.
+    /// Place in the list of adapters, best first. It is the number that [`Device::Index`] takes.
     pub index: usize,
-    /// The name that the driver gives it.
+    /// Name of the adapter, from the driver.
     pub name: String,
     /// Driver and version.
     pub driver: String,
     /// `Vulkan`, `Metal`, `Dx12` or `BrowserWebGpu`.
     pub backend: String,
-    /// Whether it is software on the processor, such as lavapipe.
+    /// Whether the adapter is software on the processor, such as lavapipe.
     pub software: bool,
     /// Largest part of a buffer that a kernel can see at once, in bytes.
     #[serde(rename = "max_binding_bytes")]
@@ -32,7 +32,7 @@ pub struct AdapterSummary {
     pub timestamps: bool,
 }
 
-/// An open GPU. Clones share it.
+/// An open GPU. Clones share the device.
 #[derive(Debug, Clone)]
 pub struct Gpu {
     shared: Arc<Shared>,
@@ -44,26 +44,26 @@ struct Shared {
     queue: wgpu::Queue,
     summary: AdapterSummary,
     limits: wgpu::Limits,
-    /// Bytes of all buffers and textures alive.
+    /// Bytes of all existing buffers and textures.
     bytes: Arc<AtomicU64>,
     most_bytes: AtomicU64,
-    /// The first error that no scope caught.
+    /// First error that no scope caught.
     failure: Arc<Mutex<Option<String>>>,
 }
 
-/// Drivers that are looked for. OpenGL is not among them: it lacks what the kernels need, and its loaders
-/// print on start.
+/// Backends that are searched. OpenGL is not among them: it lacks features that the kernels need, and its loaders print
+/// messages on start.
 const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = BACKENDS;
-    // The arguments of indirect dispatches come from this crate's own kernels, which clamp them.
+    // The arguments of indirect dispatches come from this crate's own kernels, which clamp them. They need no validation.
     descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     wgpu::Instance::new(descriptor)
 }
 
-/// Returns how good an adapter is, 0 for the best: discrete, integrated, virtual, other, software.
+/// Returns the rank of an adapter, 0 for the best: discrete, integrated, virtual, other, software.
 #[must_use]
 pub fn rank(adapter: &wgpu::Adapter) -> u8 {
     match adapter.get_info().device_type {
@@ -75,7 +75,7 @@ pub fn rank(adapter: &wgpu::Adapter) -> u8 {
     }
 }
 
-/// All adapters of the machine, best first.
+/// Returns all adapters of the machine, best first.
 async fn sorted_adapters() -> Vec<wgpu::Adapter> {
     let mut found = instance().enumerate_adapters(BACKENDS).await;
     found.sort_by_key(rank);
@@ -95,7 +95,7 @@ fn summarise(index: usize, adapter: &wgpu::Adapter) -> AdapterSummary {
     }
 }
 
-/// Returns the machine's adapters, best first; none where there is no driver.
+/// Returns the adapters of the machine, best first. The list is empty if there is no driver.
 pub async fn adapters_async() -> Vec<AdapterSummary> {
     sorted_adapters().await.iter().enumerate().map(|(i, adapter)| summarise(i, adapter)).collect()
 }
@@ -108,7 +108,7 @@ pub fn adapters() -> Vec<AdapterSummary> {
 }
 
 impl Device {
-    /// Opens the GPU that this means; `None` if it means the processor.
+    /// Opens the GPU that this device names; `None` if it names the processor.
     ///
     /// # Errors
     /// As [`Renderer::open_async`](crate::Renderer::open_async).
@@ -125,7 +125,7 @@ impl Device {
         pollster::block_on(self.open_gpu_async())
     }
 
-    /// [`Self::open_gpu_async`] that asks the device for what `reduce` leaves of the limits.
+    /// Opens the GPU like [`Self::open_gpu_async`], with limits that `reduce` lowers.
     pub(super) async fn open_gpu_with(self, reduce: impl FnOnce(&mut wgpu::Limits)) -> Result<Option<Gpu>> {
         if self == Self::Cpu {
             return Ok(None);
@@ -145,7 +145,7 @@ impl Device {
                 _ => Err(Error::Gpu { problem: NO_ADAPTER.to_owned() }),
             };
         };
-        // Software comes last.
+        // Software comes last in the list.
         if self == Self::Auto && adapter.get_info().device_type == wgpu::DeviceType::Cpu {
             return Ok(None);
         }
@@ -159,9 +159,9 @@ impl Device {
 }
 
 impl Gpu {
-    /// Returns what this renderer asks of a device that is made elsewhere, such as by a window.
+    /// Returns the descriptor for a device that is made elsewhere, such as by a window.
     ///
-    /// The limits are WebGPU's defaults, which every adapter has, except sizes, which are the adapter's own.
+    /// Its limits are WebGPU's defaults, which every adapter has. Sizes have the limits of the adapter.
     #[must_use]
     pub fn descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let most = adapter.limits();
@@ -181,7 +181,7 @@ impl Gpu {
         }
     }
 
-    /// Makes a GPU of a device that was made with [`Self::descriptor`].
+    /// Wraps a device that was made with [`Self::descriptor`].
     #[must_use]
     pub fn from_device(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         Self::new(summarise(0, adapter), device, queue)
@@ -198,36 +198,37 @@ impl Gpu {
         Self { shared: Arc::new(Shared { device, queue, summary, limits, bytes, most_bytes, failure }) }
     }
 
-    /// Whether `other` is a clone of this. Devices of two instances can compare as equal.
+    /// Returns whether `other` is a clone of this GPU. Devices of two instances can compare as equal, so they are not
+    /// compared.
     pub(super) fn is(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.shared, &other.shared)
     }
 
-    /// The adapter that was opened.
+    /// Returns the summary of the adapter that was opened.
     #[must_use]
     pub fn summary(&self) -> &AdapterSummary {
         &self.shared.summary
     }
 
-    /// Bytes of all buffers and textures alive that this renderer made.
+    /// Returns the bytes of all existing buffers and textures that this crate made on this GPU.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.shared.bytes.load(Relaxed)
     }
 
-    /// The largest value that [`Self::bytes`] has had.
+    /// Returns the largest value that [`Self::bytes`] has had.
     #[must_use]
     pub fn most_bytes(&self) -> u64 {
         self.shared.most_bytes.load(Relaxed)
     }
 
-    /// The device.
+    /// Returns the device.
     #[must_use]
     pub fn device(&self) -> &wgpu::Device {
         &self.shared.device
     }
 
-    /// The queue.
+    /// Returns the queue.
     #[must_use]
     pub fn queue(&self) -> &wgpu::Queue {
         &self.shared.queue
@@ -237,24 +238,24 @@ impl Gpu {
         &self.shared.limits
     }
 
-    /// Largest part of a buffer that a kernel can see, in bytes.
+    /// Returns the size of the largest part of a buffer that a kernel can see, in bytes.
     pub(super) fn max_binding(&self) -> u64 {
         self.shared.limits.max_storage_buffer_binding_size.min(self.shared.limits.max_buffer_size)
     }
 
-    /// Adds `size` to the bytes alive until the result is dropped.
+    /// Adds `size` to the bytes of existing buffers until the result is dropped.
     pub(super) fn count(&self, size: u64) -> Counted {
         let counted = Counted::new(size, &self.shared.bytes);
         self.shared.most_bytes.fetch_max(self.bytes(), Relaxed);
         counted
     }
 
-    /// Runs `make`, which submits nothing. What the device has against its calls becomes an error about `what`.
+    /// Runs `make`, which must not submit work. If the device refuses one of its calls, returns an error about `what`.
     pub(super) async fn checked<T>(&self, what: &str, make: impl FnOnce() -> Result<T>) -> Result<T> {
         let validation = self.device().push_error_scope(wgpu::ErrorFilter::Validation);
         let memory = self.device().push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let made = make();
-        // Scopes belong to the thread, so both are closed before anything is awaited.
+        // Error scopes belong to the thread, so both are closed before anything is awaited.
         let (memory, validation) = (memory.pop(), validation.pop());
         let (memory, validation) = (memory.await, validation.await);
         match memory.or(validation) {
@@ -263,8 +264,8 @@ impl Gpu {
         }
     }
 
-    /// Waits until all submitted work is done. Outside of a browser something must poll the device meanwhile,
-    /// as [`Self::wait`] does.
+    /// Waits until all submitted work is done. Outside of a browser something must poll the device meanwhile, as
+    /// [`Self::wait`] does.
     ///
     /// # Errors
     /// [`Error::Gpu`] if some work was refused.
@@ -296,7 +297,7 @@ impl Gpu {
         super::readback::poll(self.device())
     }
 
-    /// The first error that no scope caught, once.
+    /// Returns the first error that no scope caught, and forgets it.
     pub(super) fn take_failure(&self) -> Result<()> {
         let failure = self.shared.failure.lock().unwrap_or_else(PoisonError::into_inner).take();
         failure.map_or(Ok(()), |problem| Err(self.failed(problem)))

@@ -1,4 +1,4 @@
-//! What the parts of a scene share.
+//! The properties that all parts of a scene share.
 
 use lexisplat::Dictionary;
 
@@ -11,25 +11,25 @@ use super::part_layout::{ShKind, ShLayout};
 use super::path::ShPath;
 use super::sh_data::{ShData, exact_row};
 
-/// The first word of a form's bytes: `LXFM`.
+/// First word of a form's bytes: `LXFM`.
 const MAGIC: u32 = u32::from_le_bytes(*b"LXFM");
-/// The second. A program reads only what it writes.
+/// Second word of a form's bytes. A program reads only the version that it writes.
 const VERSION: u32 = 1;
-/// Words before the atoms.
+/// Number of words before the atoms.
 const HEADER_WORDS: usize = 8;
 
-/// What all parts of a scene share: the SH degree, the rules of drawing, and how SH is laid out, with the dictionary
-/// of sparse codes. Made without a GPU.
+/// The properties that all parts of a scene share: the SH degree, the rules of drawing, the layout of SH, and the
+/// dictionary of sparse codes. It is made without a GPU.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneForm {
     pub(super) layout: ShLayout,
     pub(super) antialiased: bool,
-    /// Empty where rows are dense.
+    /// The dictionary. It is empty if rows are dense.
     pub(super) dictionary: Dictionary,
 }
 
 impl SceneForm {
-    /// The form of `scene`, and of every part of it, for [`ShPath::of`] it.
+    /// Returns the form of `scene` and of every part of it, for the path [`ShPath::of`] the scene.
     #[must_use]
     pub fn of(scene: &Scene<'_>) -> Self {
         let data = match scene {
@@ -39,7 +39,7 @@ impl SceneForm {
         Self::of_data(&data, scene)
     }
 
-    /// The form of `scene` with its SH as `data`.
+    /// Returns the form of `scene` with its SH as `data`.
     pub(super) fn of_data(data: &ShData<'_>, scene: &Scene<'_>) -> Self {
         let dictionary = match data {
             ShData::Dense { .. } => Dictionary::empty(),
@@ -48,7 +48,7 @@ impl SceneForm {
         Self { layout: data.layout(), antialiased: scene.meta().antialiased, dictionary }
     }
 
-    /// How such a scene is drawn.
+    /// Returns the path by which a scene of this form is drawn.
     pub(super) fn path(&self) -> ShPath {
         match self.layout.kind {
             ShKind::Dense { half: false } => ShPath::DenseF32,
@@ -57,7 +57,7 @@ impl SceneForm {
         }
     }
 
-    /// The form as bytes, for [`Self::from_bytes`] of the same version of this crate.
+    /// Returns the form as bytes, for [`Self::from_bytes`] of the same version of this crate.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let [kind, degree, index, value, atoms] = self.layout.to_words();
@@ -67,10 +67,10 @@ impl SceneForm {
         header.into_iter().chain(atoms).flat_map(u32::to_le_bytes).collect()
     }
 
-    /// Reads bytes of [`Self::to_bytes`].
+    /// Reads the bytes of [`Self::to_bytes`].
     ///
     /// # Errors
-    /// [`Error::Codec`] for any others.
+    /// [`Error::Codec`] for any other bytes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let refused = |problem: String| Error::format("form of a scene", problem);
         let Some((header, rest)) = bytes.split_first_chunk::<{ 4 * HEADER_WORDS }>() else {
@@ -94,7 +94,7 @@ impl SceneForm {
         Ok(Self { layout, antialiased: antialiased == 1, dictionary })
     }
 
-    /// The atoms as kernels read them, each filled up to whole vectors.
+    /// Returns the atoms in the layout that kernels read. Each atom is padded to whole vectors.
     pub(super) fn atoms(&self) -> Vec<u32> {
         let (dim, row) = (self.dictionary.dim(), 4 * vectors(self.layout.degree.rest_per_channel()));
         let mut out = vec![0; self.dictionary.len() * row];

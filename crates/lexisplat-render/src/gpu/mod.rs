@@ -1,24 +1,24 @@
-//! The rasteriser on the GPU. It has the rules of the CPU renderer, and draws straight from dense SH or sparse
+//! The rasteriser on the GPU. It has the rules of the CPU renderer, and draws from dense SH or directly from sparse
 //! codes.
 //!
-//! The kernels run in this order. `cull` marks the Gaussians that may be visible, and `compact` gives them
-//! slots, in order. `project` makes ellipses of the slots, and `radiance` colours them. A stable radix sort
-//! orders them by depth. `tiles` lists them for every tile that they may touch, and another sort brings the
-//! lists of each tile together. `blend` draws the tiles. Only the GPU knows how many slots and entries there
-//! are, so it sizes its own dispatches. A buffer that turns out too small is made larger, and the picture is
-//! drawn again.
+//! The kernels run in this order. `cull` marks the Gaussians that may be visible, and `compact` gives them slots, in
+//! order. `project` turns the Gaussians of the slots into ellipses, and `radiance` colours them. A stable radix sort
+//! orders the slots by depth. `tiles` lists each slot for every tile that it may touch, and another sort brings the
+//! entries of each tile together. `blend` draws the tiles. Only the GPU knows the numbers of slots and entries, so it
+//! sizes its own dispatches. A buffer that turns out too small is made larger, and the picture is drawn again.
 //!
-//! To measure sensitivities, the second sort moves the entries' places in the lists instead of their slots.
-//! After `blend`, `moments` sums how each entry's splat changes its tile, and `gather_moments` adds up the
-//! entries of each splat, all in fixed order. The processor carries the sums over to the world.
+//! To measure sensitivities, the second sort moves the places of entries in the lists instead of their slots. After
+//! `blend`, `moments` sums how the splat of each entry changes the tile, and `gather_moments` adds up the entries of each
+//! splat. All sums have a fixed order. The processor carries the sums over to the world.
 //!
-//! Kernels ask for no more than WebGPU's defaults: 8 storage buffers, 256 lanes, and 16 KiB of workgroup memory.
-//! Only [`ShPath::SparseShared`] with a large dictionary needs more of that. A scene is made of parts, each laid out by
-//! [`ScenePart`] and uploaded by itself; those larger than a binding are cut into chunks. Pictures whose lists are larger than a binding are cut into bands; bands look for their own
-//! Gaussians where the slots do not hold those of the whole view.
+//! Kernels need no more than WebGPU's default limits: 8 storage buffers, 256 lanes, and 16 KiB of workgroup memory. Only
+//! [`ShPath::SparseShared`] with a large dictionary needs more workgroup memory. A scene is made of parts. [`ScenePart`]
+//! lays out a part, and each part is uploaded by itself. Parts larger than a binding are cut into chunks. Pictures whose
+//! lists are larger than a binding are cut into bands. If the slots do not hold the Gaussians of the whole view, each
+//! band searches for its own Gaussians.
 //!
-//! Nothing blocks but the functions that have a twin ending in `_async`, and a browser does not have those.
-//! Outside of a browser the futures need something that polls the device, such as `Gpu::wait` on another thread.
+//! The only functions that block are those with a twin ending in `_async`, and they do not exist in a browser. Outside of
+//! a browser the futures need something that polls the device, such as `Gpu::wait` on another thread.
 
 mod buffer;
 mod chunks;

@@ -1,4 +1,4 @@
-//! What measuring sensitivities needs besides drawing: the moments of every entry of the tiles' lists.
+//! Moments of every entry of the tile lists. Measuring sensitivities needs them in addition to the buffers for drawing.
 
 use crate::cpu::Moments;
 use crate::error::Result;
@@ -7,20 +7,20 @@ use super::buffer::Buffer;
 use super::device::Gpu;
 use super::work::{Capacity, WORD};
 
-/// Most bytes of moments at once: 1 GiB, or less where a kernel sees less.
+/// Largest number of bytes of moments at once: 1 GiB, or less if a kernel can see less.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
-/// Bytes of one splat's moments.
+/// Number of bytes of one splat's moments.
 pub(super) const MOMENTS_BYTES: u64 = size_of::<Moments>() as u64;
 
-/// Buffers that only measuring needs.
+/// The buffers that only measuring needs.
 #[derive(Debug)]
 pub(super) struct MomentBuffers {
-    /// The slot of each entry, in the order the entries are listed in. While measuring, the sort moves the
-    /// entries' places in this list instead of their slots.
+    /// Slot of each entry, in the order in which the entries are listed. While sensitivities are measured, the sort moves
+    /// the places of entries in this list instead of their slots.
     pub(super) listed_slots: Buffer,
-    /// The moments of each entry, in the order the entries are listed in.
+    /// Moments of each entry, in the order in which the entries are listed.
     pub(super) of_entries: Buffer,
-    /// The moments of each slot.
+    /// Moments of each slot.
     pub(super) of_slots: Buffer,
     pub(super) of_slots_back: Buffer,
     pub(super) gaussians_back: Buffer,

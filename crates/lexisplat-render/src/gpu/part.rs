@@ -1,4 +1,4 @@
-//! Parts of scenes, which are made without a GPU and handed from thread to thread as bytes.
+//! Parts of scenes. They are made without a GPU, and passed from thread to thread as bytes.
 
 use std::ops::Range;
 
@@ -11,11 +11,11 @@ use super::part_layout::{HEADER_WORDS, Outline, Section, ShKind};
 use super::path::ShPath;
 use super::sh_data::{ShData, body, dense_row, exact_row, shape};
 
-/// A run of Gaussians with its arrays as kernels read them, in one piece of memory.
+/// A run of consecutive Gaussians with their arrays in the layout that kernels read, in one piece of memory.
 ///
-/// A worker makes it of what it decoded and hands over [`Self::as_bytes`]. The thread that draws borrows them with
-/// [`Self::from_bytes`], and gives it to [`GpuScene::put_async`](super::GpuScene::put_async). The bytes are those of
-/// one version of this crate on one kind of machine, and are not for files.
+/// A worker makes a part from decoded Gaussians and passes on [`Self::as_bytes`]. The thread that draws borrows the bytes
+/// with [`Self::from_bytes`], and uploads the part with [`GpuScene::put_async`](super::GpuScene::put_async). The bytes
+/// are only valid for one version of this crate on one kind of machine. They must not be stored in files.
 #[derive(Debug, Clone)]
 pub struct ScenePart<'a> {
     words: Words<'a>,
@@ -27,16 +27,16 @@ pub struct ScenePart<'a> {
 #[derive(Debug, Clone)]
 enum Words<'a> {
     Own(Vec<u32>),
-    /// At any address.
+    /// Bytes at any address.
     Borrowed(&'a [u8]),
 }
 
 impl ScenePart<'static> {
-    /// Lays out all of `scene` for [`ShPath::of`] it.
+    /// Lays out all of `scene` for the path [`ShPath::of`] the scene.
     ///
     /// # Errors
-    /// [`Error::Codec`] if the scene's arrays do not fit one another; [`Error::GpuLimit`] for more than 2^32 - 2
-    /// Gaussians or 2^32 - 1 words of codes, or for more than this machine addresses.
+    /// [`Error::Codec`] if the lengths of the scene's arrays do not match; [`Error::GpuLimit`] for more than 2^32 - 2
+    /// Gaussians or 2^32 - 1 words of codes, or for more than this machine can address.
     pub fn new(scene: &Scene<'_>) -> Result<Self> {
         scene.validate()?;
         let data = ShData::new(scene, ShPath::of(scene))?;
@@ -106,12 +106,12 @@ impl ScenePart<'static> {
 }
 
 impl<'a> ScenePart<'a> {
-    /// Borrows a part from `bytes`, which [`Self::as_bytes`] gave, at any address. Nothing is copied.
+    /// Borrows a part from `bytes`, which must come from [`Self::as_bytes`], at any address. Nothing is copied.
     ///
     /// # Errors
-    /// [`Error::Codec`] for any bytes with which a kernel would read outside of its arrays, or from which no
-    /// picture follows: sizes that are not those of `bytes`, counts that do not fit the nonzeros, numbers of atoms
-    /// or escapes that are too large, or positions that are not finite.
+    /// [`Error::Codec`] for bytes with which a kernel would read outside of its arrays, or from which no picture can be
+    /// drawn: sizes that do not match the length of `bytes`, counts that do not match the nonzeros, numbers of atoms or
+    /// escapes that are too large, and positions that are not finite.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self> {
         let refused = |problem| Error::format("part of a scene", problem);
         Self::read(bytes).map_err(refused)
@@ -133,7 +133,7 @@ impl<'a> ScenePart<'a> {
         Ok(this)
     }
 
-    /// All of the part, for [`Self::from_bytes`]. Nothing is copied.
+    /// Returns the whole part as bytes, for [`Self::from_bytes`]. Nothing is copied.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8] {
         match &self.words {
@@ -142,19 +142,19 @@ impl<'a> ScenePart<'a> {
         }
     }
 
-    /// A copy of [`Self::as_bytes`].
+    /// Returns a copy of [`Self::as_bytes`].
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         self.as_bytes().to_vec()
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> u32 {
         self.outline.len
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.outline.len == 0
@@ -166,18 +166,18 @@ impl<'a> ScenePart<'a> {
         self.bounds
     }
 
-    /// The bytes of an array.
+    /// Returns the bytes of an array.
     pub(super) fn section(&self, section: Section) -> &[u8] {
         self.as_bytes().get(self.outline.section(section)).unwrap_or_default()
     }
 
-    /// Returns the box around what can be drawn, and tells what is wrong with a body.
+    /// Returns the corners of a box around all positions that can be drawn. The error tells what is wrong with a body.
     fn find_bounds(&self) -> Result<Option<[[f32; 3]; 2]>, String> {
         let mut bounds: Option<[[f32; 3]; 2]> = None;
         for (i, body) in self.section(Section::Bodies).chunks_exact(16).enumerate() {
             let [x, y, z, largest] =
                 std::array::from_fn(|k| f32::from_bits(word(&body[4 * k..]).unwrap_or(u32::MAX)));
-            // One that is never drawn may lie anywhere.
+            // A Gaussian that is never drawn may lie anywhere.
             if largest.is_nan() || largest < 0.0 {
                 continue;
             }
@@ -195,18 +195,18 @@ impl<'a> ScenePart<'a> {
     }
 }
 
-/// The words of one array.
+/// Returns the words of one array.
 fn array<'w>(words: &'w mut [u32], outline: &Outline, section: Section) -> &'w mut [u32] {
     let bytes = outline.section(section);
     &mut words[bytes.start / 4..bytes.end / 4]
 }
 
-/// The word that `bytes` begin with.
+/// Returns the word at the start of `bytes`.
 pub(super) fn word(bytes: &[u8]) -> Option<u32> {
     bytes.first_chunk().map(|bytes| u32::from_le_bytes(*bytes))
 }
 
-/// The words that fill `bytes`.
+/// Returns the words in `bytes`.
 pub(super) fn words(bytes: &[u8]) -> impl ExactSizeIterator<Item = u32> + DoubleEndedIterator + '_ {
     bytes.chunks_exact(4).map(|bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]))
 }

@@ -1,20 +1,20 @@
-//! Checks that kernels stay within the arrays of a part that came as bytes.
+//! Checks that kernels stay within the arrays of a part that was passed as bytes.
 
 use super::constants::{COLUMN_GROUP, COLUMN_WORDS, ESCAPED};
 use super::part::{ScenePart, word, words};
 use super::part_layout::{Section, ShKind};
 
-/// Bytes of the places and counts of a group of Gaussians.
+/// Number of bytes of the place and the counts of a group of Gaussians.
 const GROUP_BYTES: usize = 4 * COLUMN_WORDS as usize;
 
 impl ScenePart<'_> {
-    /// Checks places, counts, atom numbers and escapes of sparse codes; tells what is wrong.
+    /// Checks the places, counts, atom numbers and escapes of sparse codes. The error tells what is wrong.
     pub(super) fn check_codes(&self) -> Result<(), String> {
         let ShKind::Codes { index, value, atoms } = self.outline.layout.kind else { return Ok(()) };
         let most = self.outline.layout.degree.rest();
         let nonzeros = self.section(Section::Nonzeros);
         let mut escaped = words(self.section(Section::Escaped));
-        // The place of the group, in words.
+        // Place of the group's nonzeros, in words.
         let mut at = 0_usize;
         let groups = self.section(Section::Columns).chunks_exact(GROUP_BYTES);
         for (group, first) in groups.zip((0_u32..).step_by(COLUMN_GROUP as usize)) {
@@ -33,7 +33,7 @@ impl ScenePart<'_> {
                     total += usize::from(count);
                 }
             }
-            // At most 16 times 72 nonzeros.
+            // A group has at most 16 times 72 nonzeros.
             let index_bytes = total * index as usize;
             let end = at + index_bytes.div_ceil(4) + (total * value as usize).div_ceil(4);
             let own = nonzeros.get(4 * at..4 * end);
@@ -53,7 +53,7 @@ impl ScenePart<'_> {
     }
 }
 
-/// Whether all numbers of `width` bytes are below `atoms`.
+/// Returns whether all numbers, of `width` bytes each, are below `atoms`.
 fn are_below(numbers: &[u8], width: u32, atoms: u32) -> bool {
     match width {
         1 => numbers.iter().all(|&number| u32::from(number) < atoms),

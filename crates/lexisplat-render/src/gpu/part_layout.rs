@@ -1,8 +1,9 @@
-//! How a part of a scene lies in memory: a header, then its arrays one after the other.
+//! The layout of a part of a scene in memory: a header, then its arrays one after the other.
 //!
-//! The header has [`HEADER_WORDS`] little-endian words: [`MAGIC`], [`VERSION`], the kind of SH, the degree, the
-//! number of Gaussians, the bytes of an atom number and of a value, the atoms of the dictionary, the escapes and the
-//! words of nonzeros; the rest is 0. Each array begins at a multiple of [`ALIGNMENT`] bytes.
+//! The header has [`HEADER_WORDS`] little-endian words: [`MAGIC`], [`VERSION`], the kind of SH, the degree, the number of
+//! Gaussians, the bytes of an atom number, the bytes of a value, the number of atoms of the dictionary, the number of
+//! escapes and the number of words of nonzeros. The other words are 0. Each array begins at a multiple of [`ALIGNMENT`]
+//! bytes.
 
 use std::ops::Range;
 
@@ -10,25 +11,25 @@ use lexisplat::ShDegree;
 
 use super::constants::{COLUMN_GROUP, COLUMN_WORDS, vectors};
 
-/// The first word of a part: `LXPT`.
+/// First word of a part: `LXPT`.
 const MAGIC: u32 = u32::from_le_bytes(*b"LXPT");
-/// The second. A program reads only the layout that it writes.
+/// Second word of a part. A program reads only the version that it writes.
 const VERSION: u32 = 1;
-/// Words of the header.
+/// Number of words of the header.
 pub(super) const HEADER_WORDS: usize = 16;
-/// Arrays begin at multiples of this many bytes, those of the largest element.
+/// Alignment of arrays, in bytes: the size of the largest element.
 const ALIGNMENT: u64 = 16;
-/// Arrays of a part.
+/// Number of arrays of a part.
 const SECTIONS: usize = 7;
 
-/// How SH is laid out. It is the same in all parts of a scene.
+/// The layout of SH. It is the same in all parts of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ShLayout {
     pub(super) degree: ShDegree,
     pub(super) kind: ShKind,
 }
 
-/// Rows or codes.
+/// The kind of SH: dense rows or sparse codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ShKind {
     /// Every coefficient, in 32 or 16 bits.
@@ -40,36 +41,37 @@ pub(super) enum ShKind {
 /// The arrays of a part, in order.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Section {
-    /// Positions and largest standard deviations: four floats.
+    /// Positions and largest standard deviations: four floats for each Gaussian.
     Bodies,
-    /// Log scales, opacity logits, quaternions: eight floats.
+    /// Log scales, opacity logits and quaternions: eight floats for each Gaussian.
     Shapes,
-    /// Dense rows; or base colours, of three floats.
+    /// Dense rows; or base colours, of three floats each.
     Colours,
-    /// Places and counts of codes: see [`super::columns`].
+    /// Places and counts of codes, as described in [`super::columns`].
     Columns,
-    /// The numbers of the escaped Gaussians within the part.
+    /// Numbers of the escaped Gaussians within the part.
     Escaped,
     /// Atom numbers and values.
     Nonzeros,
-    /// The exact rows of the escaped Gaussians: coefficients in order, with the three channels side by side.
+    /// Exact rows of the escaped Gaussians. Coefficients are in order, with the three channels of a coefficient side by
+    /// side.
     Exact,
 }
 
-/// What the header tells.
+/// The contents of the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Outline {
     pub(super) layout: ShLayout,
     /// Number of Gaussians.
     pub(super) len: u32,
-    /// Number of escaped ones.
+    /// Number of escaped Gaussians.
     pub(super) escapes: u32,
-    /// Words of nonzeros.
+    /// Number of words of nonzeros.
     pub(super) words: u32,
 }
 
 impl ShLayout {
-    /// The layout as words: kind, degree, bytes of an atom number, bytes of a value, atoms.
+    /// Returns the layout as words: kind, degree, bytes of an atom number, bytes of a value, number of atoms.
     pub(super) fn to_words(self) -> [u32; 5] {
         let degree = u32::from(self.degree.get());
         match self.kind {
@@ -78,7 +80,7 @@ impl ShLayout {
         }
     }
 
-    /// The layout of words made by [`Self::to_words`]; what is wrong with others.
+    /// Returns the layout from the words of [`Self::to_words`]. The error tells what is wrong with other words.
     pub(super) fn from_words([kind, degree, index, value, atoms]: [u32; 5]) -> Result<Self, String> {
         let known = u8::try_from(degree).ok().and_then(|degree| ShDegree::new(degree).ok());
         let degree = known.ok_or_else(|| format!("SH degree {degree}"))?;
@@ -90,7 +92,7 @@ impl ShLayout {
         Ok(Self { degree, kind })
     }
 
-    /// Bytes of the dense row of a Gaussian, or of its base colour.
+    /// Returns the number of bytes of the dense row of a Gaussian, or of its base colour.
     pub(super) fn colour_bytes(self) -> u64 {
         match self.kind {
             ShKind::Dense { half } => {
@@ -101,14 +103,14 @@ impl ShLayout {
         }
     }
 
-    /// Bytes of an exact row.
+    /// Returns the number of bytes of an exact row.
     pub(super) fn exact_bytes(self) -> u64 {
         4 * self.degree.rest() as u64
     }
 }
 
 impl Outline {
-    /// Bytes of each array.
+    /// Returns the number of bytes of each array.
     fn sizes(&self) -> [u64; SECTIONS] {
         let [n, escapes, words] = [self.len, self.escapes, self.words].map(u64::from);
         let groups = match self.layout.kind {
@@ -120,13 +122,13 @@ impl Outline {
         [16 * n, 32 * n, self.layout.colour_bytes() * n, columns, 4 * escapes, 4 * words, exact]
     }
 
-    /// Bytes of header and arrays together.
+    /// Returns the number of bytes of the header and all arrays.
     pub(super) fn bytes(&self) -> u64 {
         let arrays: u64 = self.sizes().iter().map(|size| size.next_multiple_of(ALIGNMENT)).sum();
         4 * HEADER_WORDS as u64 + arrays
     }
 
-    /// Where an array lies, in bytes. [`Self::bytes`] must fit in memory.
+    /// Returns the place of an array, in bytes. [`Self::bytes`] must fit in memory.
     pub(super) fn section(&self, section: Section) -> Range<usize> {
         let sizes = self.sizes();
         let before = sizes[..section as usize].iter().map(|size| size.next_multiple_of(ALIGNMENT));
@@ -135,7 +137,7 @@ impl Outline {
         in_memory(start)..in_memory(start + sizes[section as usize])
     }
 
-    /// The header.
+    /// Returns the header.
     pub(super) fn to_words(self) -> [u32; HEADER_WORDS] {
         let [kind, degree, index, value, atoms] = self.layout.to_words();
         let mut words = [0; HEADER_WORDS];
@@ -144,7 +146,7 @@ impl Outline {
         words
     }
 
-    /// Reads a header; tells what is wrong with it.
+    /// Reads a header. The error tells what is wrong with it.
     pub(super) fn from_words(words: [u32; HEADER_WORDS]) -> Result<Self, String> {
         let [magic, version, kind, degree, len, index, value, atoms, escapes, nonzeros, rest @ ..] = words;
         if magic != MAGIC || version != VERSION {

@@ -1,11 +1,11 @@
-//! Some Gaussians of a part, for who has to know where a scene is.
+//! Samples Gaussians of a part, for callers that need to know where a scene is.
 
 use lexisplat::Geometry;
 
 use super::part::ScenePart;
 use super::part_layout::Section;
 
-/// Numbers of a Gaussian in [`Section::Bodies`] and [`Section::Shapes`].
+/// Number of values of a Gaussian in [`Section::Bodies`] and in [`Section::Shapes`].
 const BODY: usize = 4;
 const SHAPE: usize = 8;
 
@@ -31,7 +31,7 @@ impl ScenePart<'_> {
     }
 }
 
-/// The rows of `N` numbers that lie in `bytes`.
+/// Returns the rows of `N` numbers in `bytes`.
 fn rows<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = [f32; N]> {
     let number = |bytes: &[u8; 4]| f32::from_ne_bytes(*bytes);
     bytes.chunks_exact(4 * N).map(move |row| {

@@ -1,23 +1,24 @@
-//! The ways in which a GPU can hold SH.
+//! The ways of holding SH on a GPU.
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 
-/// How SH is held on the GPU, and evaluated.
+/// The way in which SH is held and evaluated on the GPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ShPath {
-    /// Every coefficient in 32 bits.
+    /// Dense SH: every coefficient in 32 bits.
     DenseF32,
-    /// Every coefficient in 16 bits.
+    /// Dense SH: every coefficient in 16 bits.
     DenseF16,
-    /// Sparse codes, with the dictionary read through the cache.
+    /// Sparse codes. The dictionary is read through the cache.
     Sparse,
-    /// As [`Self::Sparse`], with the Gaussians of each workgroup ordered by nonzeros before they are coloured.
+    /// Like [`Self::Sparse`]. In addition the Gaussians of each workgroup are ordered by number of nonzeros before they
+    /// are coloured.
     SparseOrdered,
-    /// Sparse codes, with the dictionary in workgroup memory. Only for dictionaries that fit there.
+    /// Sparse codes. The dictionary is held in workgroup memory, in which it must fit.
     SparseShared,
-    /// Sparse codes, with each atom's radiance from a table over directions. This is an approximation.
+    /// Sparse codes. The radiance of each atom is read from a table over directions. This is an approximation.
     SparseTable,
 }
 
@@ -32,7 +33,7 @@ impl ShPath {
         Self::SparseTable,
     ];
 
-    /// Its name in reports and on the command line.
+    /// Returns the name of the path in reports and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -45,13 +46,13 @@ impl ShPath {
         }
     }
 
-    /// Whether it needs a compressed scene.
+    /// Returns whether the path needs a compressed scene.
     #[must_use]
     pub fn is_sparse(self) -> bool {
         !matches!(self, Self::DenseF32 | Self::DenseF16)
     }
 
-    /// Returns the path that draws `scene` as it is stored, exactly.
+    /// Returns the path that draws `scene` in its own representation, without approximation.
     #[must_use]
     pub fn of(scene: &Scene<'_>) -> Self {
         match scene {

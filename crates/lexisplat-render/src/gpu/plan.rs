@@ -1,4 +1,4 @@
-//! Plans a picture: which kernels run, in which order, and on which buffers.
+//! Plans a picture: the kernels that run, their order, and their buffers.
 
 use std::num::NonZeroU64;
 use std::sync::{Arc, Weak};
@@ -16,19 +16,19 @@ use super::work::{PIXEL, Work};
 
 use crate::conventions::TILE;
 
-/// A part of drawing that is timed.
+/// A stage of drawing, which is timed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum DrawStage {
     /// Finds the Gaussians that may be visible.
     Cull,
-    /// Projects them to ellipses on screen.
+    /// Projects these Gaussians to ellipses on screen.
     Project,
-    /// Works out their colours.
+    /// Computes their colours.
     Radiance,
     /// Orders them by depth.
     Sort,
-    /// Lists for each tile what may touch it.
+    /// Lists the Gaussians that may touch each tile.
     Tiles,
     /// Draws the pixels.
     Blend,
@@ -39,7 +39,7 @@ impl DrawStage {
     pub const ALL: [Self; 6] =
         [Self::Cull, Self::Project, Self::Radiance, Self::Sort, Self::Tiles, Self::Blend];
 
-    /// Its name in reports.
+    /// Returns the name of the stage in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -53,32 +53,32 @@ impl DrawStage {
     }
 }
 
-/// What a plan depends on besides the scene and the buffers.
+/// The properties of a picture that its plan depends on, besides the scene and the buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
-    /// Columns of tiles.
+    /// Number of columns of tiles.
     pub(super) columns: u32,
-    /// Rows of tiles.
+    /// Number of rows of tiles.
     pub(super) rows: u32,
     /// Width in pixels.
     pub(super) width: u32,
     /// Height in pixels.
     pub(super) height: u32,
-    /// Rows of tiles drawn at once.
+    /// Number of rows of tiles that are drawn together.
     pub(super) band_rows: u32,
-    /// Whether each band looks for its own Gaussians, because those of all bands do not fit at once.
+    /// Whether each band searches for its own Gaussians, because the Gaussians of all bands do not fit at once.
     pub(super) bands_see: bool,
-    /// Significant bits of depth keys.
+    /// Number of significant bits of depth keys.
     pub(super) depth_bits: u32,
 }
 
-/// All the kernels that one picture needs, in order, with their bindings.
+/// All kernels of one picture, in order, with their bindings.
 pub(super) struct Plan {
     pub(super) shape: Shape,
     pub(super) scene: u64,
     scene_lives: Weak<()>,
     pub(super) passes: Vec<StagePass>,
-    /// The bindings refer to these.
+    /// Uniform buffers that the bindings refer to.
     _uniforms: Vec<Buffer>,
 }
 
@@ -97,17 +97,17 @@ pub(super) struct Step {
 
 /// The number of workgroups of a dispatch.
 pub(super) enum Size {
-    /// This many.
+    /// A fixed number.
     Groups(u32),
-    /// As many as the GPU works out. The number is the place in the buffer of dispatches, in bytes.
+    /// A number that the GPU computes. The value is its place in the buffer of dispatches, in bytes.
     Indirect(u64),
 }
 
-/// Bytes of a dispatch's arguments: three words.
+/// Number of bytes of a dispatch's arguments: three words.
 const ARGUMENTS: u64 = 12;
 
 impl Size {
-    /// One lane for each slot of chunk `k`.
+    /// Returns the size with a lane for each slot of chunk `k`.
     fn chunk(k: u64) -> Self {
         Self::Indirect((Dispatch::Chunks as u64 + k) * ARGUMENTS)
     }
@@ -121,31 +121,31 @@ impl Size {
 #[path = "tests/scan_sort.rs"]
 mod tests;
 
-/// The buffers that a sort works on, and the places of the numbers it needs.
+/// The buffers of a sort, and the places of the numbers that it needs.
 struct Sorting<'a> {
     keys: [&'a Buffer; 2],
     values: [&'a Buffer; 2],
-    /// Significant bits of the keys.
+    /// Number of significant bits of the keys.
     bits: u32,
     length: Counter,
     blocks: Counter,
     digits: Counter,
     groups: Dispatch,
     scan_groups: Dispatch,
-    /// Whether the values are at first the places of their keys. The buffer of values need not hold them.
+    /// Whether the values begin as the places of their keys. The buffer of values is then not read.
     identity: bool,
 }
 
-/// Bytes between the uniforms of neighbouring chunks (WebGPU's `minUniformBufferOffsetAlignment`).
+/// Distance of the uniforms of neighbouring chunks, in bytes (WebGPU's `minUniformBufferOffsetAlignment`).
 const UNIFORM_STRIDE: usize = 256;
 
-/// What kernels are told about the chunks of a scene. It belongs to the plan, so that a scene whose parts change
-/// often makes it only for the pictures that are drawn.
+/// The numbers that describe the chunks of a scene to kernels. They belong to the plan, so that a scene whose parts
+/// change often makes them only for the pictures that are drawn.
 struct Chunks<'a> {
     all: Vec<&'a ChunkBuffers>,
-    /// A [`ChunkUniform`] every [`UNIFORM_STRIDE`] bytes.
+    /// One [`ChunkUniform`] for each [`UNIFORM_STRIDE`] bytes.
     uniforms: Buffer,
-    /// The first block of each chunk, and the end of the last.
+    /// First block of each chunk, and the end of the last chunk.
     blocks: Buffer,
 }
 
@@ -167,7 +167,7 @@ impl<'a> Chunks<'a> {
         Ok(Self { all: scene.chunks().collect(), uniforms, blocks })
     }
 
-    /// The chunks in order, each with the binding of its uniform.
+    /// Returns the chunks in order, each with the binding of its uniform.
     fn each(&self) -> impl Iterator<Item = (&'a ChunkBuffers, wgpu::BindGroupEntry<'_>)> {
         let entry = |offset| wgpu::BindGroupEntry {
             binding: 1,
@@ -191,7 +191,7 @@ struct Planner<'a> {
 }
 
 impl Plan {
-    /// Plans pictures of `shape` of `scene`, drawn with the buffers in `work`.
+    /// Plans pictures of `scene` with this `shape`, drawn with the buffers in `work`.
     pub(super) async fn new(
         gpu: &Gpu,
         kernels: &Kernels,
@@ -204,7 +204,7 @@ impl Plan {
         gpu.checked("bindings", || planner.plan(scene, shape)).await
     }
 
-    /// Whether its scene is still there, with the same parts.
+    /// Returns whether the scene of the plan still exists and has the same parts.
     pub(super) fn is_of_use(&self) -> bool {
         self.scene_lives.strong_count() > 0
     }
@@ -228,8 +228,8 @@ impl Planner<'_> {
         Ok(Plan { shape, scene: scene.id, scene_lives, passes: self.passes, _uniforms: self.uniforms })
     }
 
-    /// Finds, projects, colours and orders the Gaussians that may be visible in some rows of tiles: the first row
-    /// and their number are given. Returns in which of the two buffers the ordered slots are.
+    /// Plans to find, project, colour and order the Gaussians that may be visible in some rows of tiles, given by the
+    /// first row and the number of rows. Returns which of the two buffers has the ordered slots.
     fn see(
         &mut self,
         scene: &GpuScene,
@@ -287,7 +287,7 @@ impl Planner<'_> {
         Ok(by_depth)
     }
 
-    /// Makes the lists of some rows of tiles and draws them. `order` holds the slots by depth.
+    /// Plans to list some rows of tiles and to draw them. `order` has the slots in the order of depth.
     fn band(&mut self, shape: Shape, order: &Buffer, first: u32, rows: u32) -> Result<()> {
         let (work, kernels) = (self.work, self.kernels);
         let tiles = rows * shape.columns;
@@ -314,7 +314,7 @@ impl Planner<'_> {
         let by_tile = self.sort(&Sorting {
             keys: work.entry_keys.each_ref(),
             values: work.entry_values.each_ref(),
-            // Entries that belong to no tile have the key after the last tile's.
+            // Entries that belong to no tile have the key after that of the last tile.
             bits: u32::BITS - tiles.leading_zeros(),
             length: Counter::Entries,
             blocks: Counter::EntryBlocks,
@@ -326,7 +326,7 @@ impl Planner<'_> {
         let sorted = &work.entry_values[by_tile];
         let mut entry_slots = sorted;
         if let Some(moments) = &work.moments {
-            // The sort no longer needs the other buffer.
+            // The sort does not need the other buffer any longer.
             entry_slots = &work.entry_values[1 - by_tile];
             let bound = all_from(0, [&work.counters, sorted, &moments.listed_slots, entry_slots]);
             self.step(&kernels["slots_of_entries"], bound, Size::of(Dispatch::Entries));
@@ -339,7 +339,7 @@ impl Planner<'_> {
         let line = u64::from(shape.width) * PIXEL;
         let top = u64::from(first) * tile;
         let lines = (u64::from(rows) * tile).min(u64::from(shape.height) - top);
-        // WebGPU wants offsets that are multiples of 256 bytes; a row of tiles is one.
+        // WebGPU wants offsets that are multiples of 256 bytes. A row of tiles is such a multiple.
         let (buffer, size) = (&work.pixels.raw, NonZeroU64::new(lines * line));
         let resource =
             wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: top * line, size });
@@ -374,8 +374,8 @@ impl Planner<'_> {
         self.passes.push(StagePass { stage, steps: std::mem::take(&mut self.steps) });
     }
 
-    /// Replaces the numbers in `data` by the sums of those before them: the first `fixed`, or as many as
-    /// `counter` says.
+    /// Plans to replace the numbers in `data` by the sums of the numbers before them. The number of values is `fixed`, or
+    /// else that of `counter`.
     fn scan(
         &mut self,
         data: &Buffer,
@@ -399,7 +399,7 @@ impl Planner<'_> {
         Ok(())
     }
 
-    /// Sorts. Returns in which of the two buffers the result is.
+    /// Plans a sort. Returns which of the two buffers has the result.
     fn sort(&mut self, sorting: &Sorting<'_>) -> Result<usize> {
         let (work, kernels) = (self.work, self.kernels);
         let passes = sorting.bits.div_ceil(DIGIT_BITS).max(1);
@@ -424,7 +424,7 @@ impl Planner<'_> {
     }
 }
 
-/// Returns two dimensions of a dispatch that has at least `groups` workgroups.
+/// Returns the two dimensions of a dispatch that has at least `groups` workgroups.
 pub(super) fn dimensions(groups: u32) -> (u32, u32) {
     (groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS))
 }

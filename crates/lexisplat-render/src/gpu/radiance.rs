@@ -1,4 +1,4 @@
-//! The radiance kernel of a scene. Its text depends on how SH is held, on the degree and on the dictionary.
+//! The radiance kernel of a scene. Its text depends on the path of SH, on the degree and on the dictionary.
 
 use crate::error::{Error, Result};
 
@@ -8,7 +8,7 @@ use super::part_layout::{ShKind, ShLayout};
 use super::path::ShPath;
 use super::shaders::{compile, pipeline};
 
-/// Bytes of workgroup memory that the shared path leaves for the compiler's own use.
+/// Number of bytes of workgroup memory that the shared path leaves to the compiler.
 const SHARED_RESERVE: usize = 64;
 
 /// Compiles the kernel that colours the Gaussians of a scene with this `layout`.
@@ -29,7 +29,7 @@ pub(super) async fn radiance_pipeline(
     gpu.checked("radiance", make).await
 }
 
-/// The text of the kernel that colours the Gaussians of a scene with this `layout`.
+/// Returns the text of the kernel that colours the Gaussians of a scene with this `layout`.
 pub(super) fn radiance_text(layout: ShLayout, path: ShPath) -> String {
     let common = concat!(include_str!("kernels/frame.wgsl"), include_str!("kernels/radiance.wgsl"));
     let codes = include_str!("kernels/radiance_sparse.wgsl");

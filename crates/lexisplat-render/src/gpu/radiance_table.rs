@@ -1,9 +1,8 @@
-//! A table of each atom's radiance over directions. With it, a nonzero costs one filtered lookup instead of a
+//! A table of the radiance of each atom over directions. With the table a nonzero costs one filtered lookup instead of a
 //! dot product. The dictionary is small, fixed and shared by all Gaussians.
 //!
-//! The table is a cube with [`TABLE_SIDE`]² texels on each face, in half precision, sampled bilinearly. The
-//! centres of the outer texels lie on the edges of the faces. A sample so never mixes two faces, and the whole
-//! is continuous.
+//! The table is a cube with [`TABLE_SIDE`]² texels on each face, in half precision, sampled bilinearly. The centres of
+//! the outer texels lie on the edges of the faces. A sample therefore never mixes two faces, and the table is continuous.
 
 use half::f16;
 use lexisplat::Dictionary;
@@ -19,7 +18,7 @@ use super::device::Gpu;
 
 /// Faces of a cube: +x, -x, +y, -y, +z, -z.
 const FACES: u32 = 6;
-/// Numbers of a texel: red, green, blue, and one that is not used.
+/// Number of values of a texel: red, green, blue, and an unused value.
 const TEXEL: usize = 4;
 
 /// The table on the GPU.
@@ -27,12 +26,12 @@ const TEXEL: usize = 4;
 pub(super) struct RadianceTable {
     pub(super) view: wgpu::TextureView,
     pub(super) sampler: wgpu::Sampler,
-    /// Bytes of the texels.
+    /// Number of bytes of the texels.
     pub(super) bytes: Counted,
 }
 
 impl RadianceTable {
-    /// Works the table out and uploads it.
+    /// Computes the table and uploads it.
     pub(super) async fn new(gpu: &Gpu, dictionary: &Dictionary) -> Result<Self> {
         let side = TABLE_SIDE;
         let layers = u32::try_from(dictionary.len()).unwrap_or(u32::MAX).max(1);
@@ -53,7 +52,7 @@ impl RadianceTable {
             view_formats: &[],
         };
         let mut texels: Vec<u16> = texels(dictionary).iter().flatten().map(|v| v.to_bits()).collect();
-        // An empty dictionary has a layer too.
+        // The texture of an empty dictionary has one layer too.
         texels.resize((FACES * side * side * layers) as usize * TEXEL, 0);
         let data = bytemuck::cast_slice(&texels);
         let make =
@@ -72,7 +71,7 @@ impl RadianceTable {
         Ok(Self { view, sampler, bytes })
     }
 
-    /// What is bound to the radiance kernel after the buffers.
+    /// Returns the bindings of the radiance kernel after the buffers.
     pub(super) fn bound(&self) -> [wgpu::BindGroupEntry<'_>; 2] {
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         [
@@ -82,7 +81,7 @@ impl RadianceTable {
     }
 }
 
-/// The direction of the texel at `column`, `row` of face `face`.
+/// Returns the direction of the texel at `column` and `row` of face number `face`.
 fn direction(face: u32, column: u32, row: u32) -> [f32; 3] {
     #[expect(clippy::cast_precision_loss, reason = "sides are small")]
     let place = |k: u32| k as f32 / (TABLE_SIDE - 1) as f32 * 2.0 - 1.0;
@@ -97,7 +96,7 @@ fn direction(face: u32, column: u32, row: u32) -> [f32; 3] {
     d.map(|v| v / length)
 }
 
-/// Returns the RGBA texels of all layers. Each layer is of one atom, and its rows span the six faces.
+/// Returns the RGBA texels of all layers. Each layer belongs to one atom, and its rows span the six faces.
 fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
     let degree = dictionary.degree();
     let per_channel = degree.rest_per_channel();
@@ -124,7 +123,7 @@ fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
         .concat()
 }
 
-/// Returns an atom's radiance towards `d` by the table, looked up as the kernel does.
+/// Returns the radiance of an atom in direction `d`, read from the table in the same way as by the kernel.
 #[cfg(test)]
 pub(super) fn sample(texels: &[[f16; 4]], atom: usize, d: [f32; 3]) -> [f32; 3] {
     let size = d.map(f32::abs);

@@ -1,11 +1,11 @@
-//! Bytes of a GPU's buffers, brought to the processor.
+//! Copies bytes of GPU buffers to the processor.
 
 use bytemuck::Pod;
 
 use crate::error::{Error, Result};
 use crate::wait::answer;
 
-/// Returns a buffer of `size` bytes that the GPU copies to and [`read_async`] reads.
+/// Returns a buffer of `size` bytes. The GPU copies to it, and [`read_async`] reads it.
 #[must_use]
 pub fn target(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor {
@@ -42,7 +42,7 @@ pub(super) fn poll(device: &wgpu::Device) -> Result<()> {
     polled.map(|_| ()).map_err(|error| Error::Gpu { problem: error.to_string() })
 }
 
-/// Returns all of a [`target`] once all submitted work that uses it is done. Blocks until then.
+/// Returns the contents of a buffer made by [`target`], once all submitted work that uses it is done. Blocks until then.
 ///
 /// # Errors
 /// As [`read_async`].
@@ -51,8 +51,8 @@ pub fn read<T: Pod>(device: &wgpu::Device, target: &wgpu::Buffer) -> Result<Vec<
     crate::wait::block_on(|| poll(device), read_async(target, target.size()))
 }
 
-/// Copies `source`, which must allow `COPY_SRC`, and returns all of it once all work submitted before is done.
-/// Blocks until then.
+/// Copies `source`, which must allow `COPY_SRC`, and returns its contents once all work submitted before is done. Blocks
+/// until then.
 ///
 /// # Errors
 /// As [`read_async`].

@@ -1,4 +1,4 @@
-//! Draws scenes on the GPU, and draws again with larger buffers where a view needs them.
+//! Draws scenes on the GPU. If a view needs larger buffers, it is drawn again.
 
 use std::collections::HashMap;
 
@@ -20,67 +20,68 @@ use super::timestamps::Timestamps;
 use super::uniforms::FrameUniform;
 use super::work::{Capacity, ENTRY_ELEMENT, PIXEL, SLOT_ELEMENT, Work};
 
-/// Slots and entries that the first buffers hold.
+/// Number of slots and entries that the first buffers hold.
 const FIRST_ROOM: u32 = 1 << 18;
-/// New buffers hold this many times what a view needed, so that moving the camera a little needs no others.
+/// Ratio of the capacity of new buffers to what a view needed, so that a small move of the camera needs no new buffers.
 const SPARE: f64 = 1.125;
-/// Most entries in the tiles' lists at once: 1 GiB of lists.
+/// Largest number of entries in the tile lists at once: 1 GiB of lists.
 const MAX_ENTRIES: u64 = 1 << 26;
-/// Most passes that are timed. The passes of a view in many bands beyond these are not.
+/// Largest number of passes that are timed. If a view in many bands has more, the others are not timed.
 const MAX_TIMED: u32 = 1024;
-/// Plans kept. They serve two scenes in turn, from cameras whose depths need one bit more or less.
+/// Largest number of plans kept. They serve two scenes in turn, from cameras whose depth keys differ by one bit.
 const MAX_PLANS: usize = 4;
-/// Most cuts remembered. One more, and all are forgotten.
+/// Largest number of cuts that are remembered. With one more, all are forgotten.
 const MAX_CUTS: usize = 64;
 
-/// A drawn picture, still on the GPU.
+/// A drawn picture on the GPU.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Frame {
-    /// `width * height` pixels of four floats: red, green, blue, not clamped, and 1. Valid until the next
-    /// picture is drawn with the same renderer.
+    /// `width * height` pixels of four floats: red, green, blue, not clamped, and 1. They are valid until the same
+    /// renderer draws its next picture.
     pub pixels: wgpu::Buffer,
-    /// Pixels in a row.
+    /// Number of pixels in a row.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Measurements of drawing it.
+    /// Measurements of the drawing.
     pub stats: FrameStats,
 }
 
-/// Milliseconds of each stage.
+/// Duration of each stage, in milliseconds.
 pub type StageTimes = Vec<(DrawStage, f64)>;
 
 /// Measurements of drawing a picture.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct FrameStats {
-    /// Gaussians that passed the coarse test and were projected and coloured. Where bands looked for their own,
-    /// those of the fullest band.
+    /// Number of Gaussians that passed the coarse test and were projected and coloured. If bands searched for their own
+    /// Gaussians: that number in the fullest band.
     pub visible: u32,
-    /// Pairs of a Gaussian and a tile that it may touch.
+    /// Number of pairs of a Gaussian and a tile that it may touch.
     pub entries: u32,
-    /// Bands of rows of tiles that it was drawn in. There is more than one where the lists do not fit at once.
+    /// Number of bands of rows of tiles. It is above 1 if the lists do not fit at once.
     pub bands: u32,
-    /// How often it was drawn again with larger buffers. Above 0 only where a view is fuller than all before.
+    /// How often the picture was drawn again with larger buffers. It is above 0 only if the view is fuller than all views
+    /// before.
     pub retries: u32,
-    /// Milliseconds of each stage on the GPU; empty where the GPU has no timestamps.
+    /// Duration of each stage on the GPU, in milliseconds; empty if the GPU has no timestamps.
     pub stages: StageTimes,
-    /// Milliseconds from the first stage's start to the last one's end.
+    /// Time from the start of the first stage to the end of the last, in milliseconds.
     pub total: Option<f64>,
 }
 
-/// Draws scenes on one GPU. Keeps its buffers from picture to picture.
+/// Draws scenes on one GPU. Buffers are kept from picture to picture.
 pub struct GpuRenderer {
     pub(super) gpu: Gpu,
     pub(super) kernels: Kernels,
-    /// Whether it also works out moments.
+    /// Whether the renderer also computes moments.
     pub(super) measuring: bool,
     pub(super) work: Option<Work>,
-    /// The plans of the last scenes and sizes, the latest last.
+    /// The plans of the last scenes and sizes, the latest plan last.
     pub(super) plans: Vec<Plan>,
     pub(super) timestamps: Option<Timestamps>,
-    /// The cuts of pictures that were found not to fit at once.
+    /// The cuts of pictures that did not fit at once.
     pub(super) cuts: HashMap<PictureKey, Cut>,
     pub(super) limits: CapacityLimits,
 }
@@ -91,15 +92,15 @@ impl std::fmt::Debug for GpuRenderer {
     }
 }
 
-/// The number of a scene, and the width and height of a picture of it.
+/// The number of a scene, and the width and height of a picture of it, in pixels.
 pub(super) type PictureKey = (u64, u32, u32);
 
-/// How a picture is cut into bands.
+/// The cut of a picture into bands.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cut {
-    /// Rows of tiles drawn at once.
+    /// Number of rows of tiles that are drawn together.
     rows: u32,
-    /// Whether each band looks for its own Gaussians.
+    /// Whether each band searches for its own Gaussians.
     see: bool,
 }
 
@@ -108,7 +109,7 @@ pub(super) struct Cut {
 pub(super) struct CapacityLimits {
     pub(super) slots: u64,
     pub(super) entries: u64,
-    /// Bytes of pixels a kernel sees at once.
+    /// Number of bytes of pixels that a kernel can see at once.
     pub(super) pixels: u64,
 }
 
@@ -145,14 +146,14 @@ impl GpuRenderer {
         })
     }
 
-    /// This renderer with smaller arrays than the GPU allows.
+    /// Returns this renderer with smaller limits than those of the GPU.
     #[cfg(test)]
     pub(super) fn with_limits(mut self, limits: CapacityLimits) -> Self {
         self.limits = limits;
         self
     }
 
-    /// The buffers that the last picture was drawn with, and how it was cut.
+    /// Returns the buffers of the last picture, and its shape.
     #[cfg(test)]
     pub(super) fn inside(&self) -> (&Work, Shape) {
         (self.work.as_ref().unwrap(), self.plans.last().unwrap().shape)
@@ -172,7 +173,7 @@ impl GpuRenderer {
         self.gpu.clone().block_on(self.render_async(scene, camera, options))
     }
 
-    /// Draws `scene` as `camera` sees it and brings the picture back.
+    /// Draws `scene` as `camera` sees it, and copies the picture to the processor.
     ///
     /// # Errors
     /// As [`Self::draw_async`].
@@ -187,7 +188,7 @@ impl GpuRenderer {
         Ok((image, frame.stats))
     }
 
-    /// Brings back the pixels of a frame of this renderer.
+    /// Copies the pixels of a frame of this renderer to the processor.
     ///
     /// # Errors
     /// [`Error::Gpu`] if the device fails.
@@ -214,9 +215,9 @@ impl GpuRenderer {
     /// Draws `scene` as `camera` sees it. The picture stays on the GPU.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the scene is on another GPU or the camera cannot be drawn with, or for a
-    /// lower degree than the scene's where radiance comes from a table; [`Error::GpuLimit`] if the view needs
-    /// larger buffers than this GPU has; [`Error::Gpu`] if the device fails.
+    /// [`Error::Parameter`] if the scene is on another GPU, if the camera is not valid, or if the degree is lower than
+    /// the scene's and radiance comes from a table; [`Error::GpuLimit`] if the view needs larger buffers than this GPU
+    /// allows; [`Error::Gpu`] if the device fails.
     pub async fn draw_async(
         &mut self,
         scene: &GpuScene,
@@ -254,7 +255,7 @@ impl GpuRenderer {
         }
     }
 
-    /// Returns the sizes of the picture, and how it is cut into bands.
+    /// Returns the sizes of the picture and its cut into bands.
     fn shape(&mut self, scene: &GpuScene, camera: &Camera) -> Result<Shape> {
         // Sides are at most 16384.
         let tile = u32::try_from(TILE).unwrap_or(u32::MAX);
@@ -275,8 +276,7 @@ impl GpuRenderer {
         Ok(Shape { columns, rows, width, height, band_rows, bands_see, depth_bits })
     }
 
-    /// Makes sure that the buffers are large enough for the scene and the picture, and for `wanted` slots and
-    /// entries.
+    /// Makes sure that the buffers are large enough for the scene, for the picture, and for `wanted` slots and entries.
     async fn make_room(&mut self, scene: &GpuScene, shape: Shape, wanted: Option<[u32; 2]>) -> Result<()> {
         let chunks = u32::try_from(scene.chunks().count()).unwrap_or(u32::MAX);
         let limit = |value: u32, most: u64| value.min(u32::try_from(most).unwrap_or(u32::MAX));
@@ -290,7 +290,7 @@ impl GpuRenderer {
         };
         let now = self.work.as_ref().map_or(least, |work| work.capacity);
         let [slots, entries] = wanted.unwrap_or([0, 0]);
-        // A scene to which parts are added makes new buffers only when it has doubled.
+        // A scene to which parts are added gets new buffers only after its size has doubled.
         let grown = |now: u32, least: u32| if least > now { least.max(now.saturating_mul(2)) } else { now };
         let capacity = Capacity {
             blocks: grown(now.blocks, least.blocks),
@@ -301,7 +301,7 @@ impl GpuRenderer {
             pixels: now.pixels.max(least.pixels),
         };
         if self.work.as_ref().is_none_or(|work| work.capacity != capacity) {
-            // The old buffers are freed first, since both together may not fit.
+            // The old buffers are freed first, because old and new buffers together may not fit.
             self.plans.clear();
             self.work = None;
             self.work = Some(Work::new(&self.gpu, capacity, self.measuring).await?);
@@ -309,8 +309,8 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Draws once, and leaves out what does not fit in the buffers. Also returns the counters, which tell
-    /// whether something was left out.
+    /// Draws once, and leaves out entries that do not fit in the buffers. Also returns the counters, which tell whether
+    /// something was left out.
     async fn attempt(
         &mut self,
         scene: &GpuScene,
@@ -323,7 +323,7 @@ impl GpuRenderer {
         let Some(work) = &self.work else {
             return Err(Error::Gpu { problem: "no buffers".to_owned() });
         };
-        // A plan keeps its scene's buffers alive.
+        // A plan keeps the buffers of its scene alive.
         self.plans.retain(Plan::is_of_use);
         let known = self.plans.iter().position(|plan| plan.scene == scene.id && plan.shape == shape);
         let plan = match known {
@@ -398,7 +398,7 @@ impl GpuRenderer {
         Ok((Frame { pixels, width: shape.width, height: shape.height, stats }, found))
     }
 
-    /// Returns the milliseconds of each stage, of all bands together, and those of the whole picture.
+    /// Returns the duration of each stage, summed over all bands, and the duration of the whole picture, in milliseconds.
     async fn times(&self, timed: &[DrawStage]) -> Result<(StageTimes, Option<f64>)> {
         let Some(timestamps) = &self.timestamps else { return Ok((Vec::new(), None)) };
         let passes = timestamps.read(&self.gpu, u32::try_from(timed.len()).unwrap_or(0)).await?;
@@ -410,7 +410,7 @@ impl GpuRenderer {
         Ok((stages.to_vec(), total))
     }
 
-    /// Returns what the view lacked, if anything.
+    /// Returns what the view lacked, or `None` if it lacked nothing.
     fn missing(&self, found: [u32; COUNTERS], shape: Shape) -> Result<Option<Missing>> {
         let Some(capacity) = self.work.as_ref().map(|work| work.capacity) else { return Ok(None) };
         let spare = |found: u32, most: u64| {
@@ -423,7 +423,7 @@ impl GpuRenderer {
             if u64::from(slots) <= self.limits.slots {
                 return Ok(Some(Missing::Capacity { slots: spare(slots, self.limits.slots), entries: 0 }));
             }
-            // Moments are summed over bands by slot, so slots must be the same in all bands.
+            // Moments are summed by slot over the bands, so slots must be the same in all bands.
             let one = shape.bands_see && shape.band_rows == 1;
             if one || self.measuring {
                 let what = if one { "Gaussians in one row of tiles" } else { "Gaussians in view" };
@@ -453,19 +453,19 @@ fn picture_key(scene: &GpuScene, camera: &Camera) -> PictureKey {
     (scene.id, camera.width, camera.height)
 }
 
-/// What a view lacked.
+/// What a view lacked: larger buffers, or smaller bands.
 enum Missing {
     Capacity {
         slots: u32,
         entries: u32,
     },
-    /// Bands of half as many rows. `see` tells whether each must look for its own Gaussians.
+    /// Bands of half as many rows. `see` tells whether each band must search for its own Gaussians.
     Bands {
         see: bool,
     },
 }
 
-/// Returns the number of significant bits of depth keys: those of the farthest corner of the scene.
+/// Returns the number of significant bits of depth keys, from the farthest corner of the scene.
 fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
     let Some(bounds) = scene.bounds() else { return 1 };
     let farthest = (0..8)
@@ -474,10 +474,10 @@ fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
             camera.to_view(at)[2]
         })
         .fold(0.0, f32::max);
-    // The depth of a corner may round differently than that of a Gaussian there.
+    // The depth of a corner may round differently from the depth of a Gaussian at the same place.
     const ROUNDING: f32 = 1.0001;
     let key = (farthest * ROUNDING).min(f32::MAX).to_bits().saturating_sub(camera.near.to_bits());
-    // One bit more, so that the key of slots that come last is above all others.
+    // One more bit puts the key of slots that come last above all other keys.
     (u32::BITS - key.leading_zeros() + 1).min(u32::BITS)
 }
 

@@ -1,4 +1,4 @@
-//! A scene on the GPU, made of parts that come and go.
+//! A scene on the GPU. It consists of parts, which can be added and removed.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,31 +22,32 @@ use super::radiance_table::RadianceTable;
 use super::sh_data::ShData;
 use super::uniforms::ChunkUniform;
 
-/// Most Gaussians of a part that a whole scene is uploaded in. The arrays of one part are in memory at once.
+/// Largest number of Gaussians of a part, when a whole scene is uploaded part by part. The arrays of one part are in
+/// memory at once.
 const PART_GAUSSIANS: usize = 1 << 20;
-/// Most blocks of Gaussians of a scene. The numbers of their Gaussians fit in 32 bits.
+/// Largest number of blocks of Gaussians of a scene. The numbers of their Gaussians fit in 32 bits.
 const MAX_BLOCKS: u32 = 1 << 24;
 
-/// Bytes of a scene on the GPU.
+/// Numbers of bytes of a scene on the GPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SceneBytes {
-    /// Positions, shapes and opacities.
+    /// Bytes of positions, shapes and opacities.
     pub geometry: u64,
-    /// Everything that colours need: base colours, coefficients or codes, dictionary, table.
+    /// Bytes of everything that colours need: base colours, coefficients or codes, dictionary, table.
     pub sh: u64,
 }
 
-/// A scene on the GPU for one [`ShPath`]. What it was made from may be dropped.
+/// A scene on the GPU for one [`ShPath`]. The scene from which it was made may be dropped.
 ///
-/// It is uploaded whole, or made empty and filled with parts. Its Gaussians have the order of the parts' indices. The
-/// picture is the same, bit for bit, however the Gaussians are divided into parts.
+/// It is uploaded whole, or made empty and filled with parts. Its Gaussians have the order of the indices of the parts.
+/// The picture is the same, bit for bit, however the Gaussians are divided into parts.
 #[derive(Debug)]
 pub struct GpuScene {
     pub(super) id: u64,
-    /// Plans hold weak references to this, and so know whether the parts that they draw are still those of the scene.
+    /// Plans hold weak references to this value. They tell a plan whether its parts are still those of the scene.
     pub(super) lives: Arc<()>,
     parts: BTreeMap<usize, Part>,
-    /// The dictionary, where kernels read it.
+    /// The dictionary, if kernels read it.
     pub(super) atoms: Option<Buffer>,
     pub(super) radiance: wgpu::ComputePipeline,
     pub(super) table: Option<RadianceTable>,
@@ -75,7 +76,7 @@ impl Part {
     }
 }
 
-/// The number of the next scene. Numbers keep bindings made for one scene from being used for another.
+/// Number of the next scene. Numbers keep bindings made for one scene from being used for another.
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 
 impl GpuScene {
@@ -91,9 +92,9 @@ impl GpuScene {
     /// Uploads `scene`.
     ///
     /// # Errors
-    /// [`Error::Codec`] if the scene's arrays do not fit one another; [`Error::Parameter`] for a sparse path
-    /// of a dense scene, or a dictionary too large for the path; [`Error::GpuLimit`] for more Gaussians than
-    /// 2^32 - 2; [`Error::Gpu`] if memory runs out.
+    /// [`Error::Codec`] if the lengths of the scene's arrays do not match; [`Error::Parameter`] for a sparse path of a
+    /// dense scene, or a dictionary too large for the path; [`Error::GpuLimit`] for more than 2^32 - 2 Gaussians;
+    /// [`Error::Gpu`] if memory runs out.
     pub async fn new_async(gpu: &Gpu, scene: &Scene<'_>, path: ShPath) -> Result<Self> {
         scene.validate()?;
         check_size(scene.len() as u64, scene.len().div_ceil(GROUP as usize) as u64)?;
@@ -135,7 +136,7 @@ impl GpuScene {
             _ => None,
         };
         let radiance = radiance_pipeline(gpu, form.layout, path).await?;
-        // Whoever looks radiance up in a table reads no atoms.
+        // A path that reads radiance from a table reads no atoms.
         let atoms = match codes && table.is_none() {
             true => {
                 let atoms = form.atoms();
@@ -172,13 +173,13 @@ impl GpuScene {
         self.gpu.clone().block_on(self.put_async(index, part))
     }
 
-    /// Uploads `part` as number `index`, in place of the one that was there. The next picture has it. Until the
-    /// upload is done, the old one is kept.
+    /// Uploads `part` as part number `index`. It replaces the part that has this number. The next picture shows it. The
+    /// old part is kept until the upload is done.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the part is not of the scene's form; [`Error::GpuLimit`] for more than 2^32 - 2
-    /// Gaussians or 2^24 blocks of 256 in all, where each part begins a block; [`Error::Gpu`] if memory runs out.
-    /// The scene is then as before.
+    /// [`Error::Parameter`] if the part does not have the form of the scene; [`Error::GpuLimit`] for more than 2^32 - 2
+    /// Gaussians or 2^24 blocks of 256 in all, where each part begins a block; [`Error::Gpu`] if memory runs out. The
+    /// scene is unchanged after an error.
     pub async fn put_async(&mut self, index: usize, part: &ScenePart<'_>) -> Result<()> {
         if part.outline.layout != self.layout {
             let (found, expected) = (part.outline.layout, self.layout);
@@ -197,7 +198,7 @@ impl GpuScene {
         Ok(())
     }
 
-    /// Removes part `index`. Returns whether it was there.
+    /// Removes part number `index`. Returns whether it existed.
     pub fn remove(&mut self, index: usize) -> bool {
         let removed = self.parts.remove(&index).is_some();
         if removed {
@@ -212,38 +213,38 @@ impl GpuScene {
         self.changed();
     }
 
-    /// Counts the Gaussians again. Plans for the parts as they were are of no more use.
+    /// Counts the Gaussians again, and invalidates plans for the old parts.
     fn changed(&mut self) {
         self.lives = Arc::default();
         self.len = self.parts.values().map(Part::len).sum();
         self.blocks = self.parts.values().map(Part::blocks).sum();
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> u32 {
         self.len
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Number of parts.
+    /// Returns the number of parts.
     #[must_use]
     pub fn parts(&self) -> usize {
         self.parts.len()
     }
 
-    /// SH degree.
+    /// Returns the SH degree.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
         self.layout.degree
     }
 
-    /// How SH is held.
+    /// Returns the path by which SH is held.
     #[must_use]
     pub fn path(&self) -> ShPath {
         self.path
@@ -257,7 +258,7 @@ impl GpuScene {
         })
     }
 
-    /// Bytes on the GPU.
+    /// Returns the numbers of bytes on the GPU.
     #[must_use]
     pub fn bytes(&self) -> SceneBytes {
         let mut bytes = SceneBytes { geometry: 0, sh: self.shared_bytes() };
@@ -268,14 +269,14 @@ impl GpuScene {
         bytes
     }
 
-    /// Those of the bytes for SH that all Gaussians share: dictionary or table.
+    /// Returns the number of bytes for SH that all Gaussians share: dictionary or table.
     fn shared_bytes(&self) -> u64 {
         let table = self.table.as_ref().map_or(0, |table| table.bytes.size);
         self.atoms.as_ref().map_or(0, Buffer::bytes) + table
     }
 
-    /// Bytes that colouring one visible Gaussian moves on average: its slot, position, SH and colour. The
-    /// dictionary or table is not counted, since caches hold it.
+    /// Returns the number of bytes that colouring one visible Gaussian moves on average: its slot, position, SH and
+    /// colour. The dictionary or table is not counted, because caches hold it.
     #[must_use]
     pub fn shading_bytes(&self) -> f64 {
         let own = self.bytes().sh.saturating_sub(self.shared_bytes()) as f64 / f64::from(self.len.max(1));
@@ -283,32 +284,32 @@ impl GpuScene {
         own + (slot + body + colour) as f64
     }
 
-    /// Bytes of geometry that finding and projecting `visible` Gaussians reads: the positions of all, and the slots,
-    /// positions and shapes of those.
+    /// Returns the number of bytes of geometry that are read to find and project `visible` Gaussians: the positions of
+    /// all Gaussians, and the slots, positions and shapes of the visible ones.
     #[must_use]
     pub fn looking_bytes(&self, visible: f64) -> f64 {
         let (slot, body, shape) = (size_of::<u32>(), size_of::<[f32; 4]>(), size_of::<[f32; 8]>());
         body as f64 * f64::from(self.len) + visible * (slot + body + shape) as f64
     }
 
-    /// The GPU that holds it.
+    /// Returns the GPU that holds the scene.
     #[must_use]
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 
-    /// Number of blocks. Every chunk begins one.
+    /// Returns the number of blocks. Every chunk begins a block.
     pub(super) fn blocks(&self) -> u32 {
         self.blocks
     }
 
-    /// The chunks of all parts, in order.
+    /// Returns the chunks of all parts, in order.
     pub(super) fn chunks(&self) -> impl Iterator<Item = &ChunkBuffers> {
         self.parts.values().flat_map(|part| &part.chunks)
     }
 
-    /// What kernels are told about each chunk. The first Gaussian of a block has the block's number times
-    /// [`GROUP`]; no Gaussian has the numbers after the last one of a short block.
+    /// Returns the numbers that describe each chunk to kernels. The first Gaussian of a block has the number of the block
+    /// times [`GROUP`]. The numbers after the last Gaussian of a short block are not used.
     pub(super) fn numbering(&self) -> Vec<ChunkUniform> {
         let mut first_block = 0;
         let number = |chunk: &ChunkBuffers| {
@@ -329,7 +330,7 @@ impl GpuScene {
     }
 }
 
-/// Refuses more Gaussians, or blocks of them, than kernels can number.
+/// Returns an error if there are more Gaussians, or blocks of them, than kernels can number.
 fn check_size(len: u64, blocks: u64) -> Result<()> {
     for (what, found, limit) in [
         ("Gaussians of a scene on the GPU", len, u64::from(u32::MAX) - 1),

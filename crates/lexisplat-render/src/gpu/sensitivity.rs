@@ -1,4 +1,4 @@
-//! Sensitivities measured on the GPU, as `cpu::sensitivity` measures them on the processor.
+//! Measures sensitivities on the GPU, like `cpu::sensitivity` on the processor.
 
 use std::collections::HashMap;
 
@@ -31,17 +31,17 @@ impl GpuRenderer {
         self.gpu.clone().block_on(self.sensitivity_async(scene, geometry, cameras, progress))
     }
 
-    /// Measures on the GPU what [`crate::sensitivity`] measures on the processor. `scene` was made of a scene
-    /// with this `geometry`. Reports [`Stage::Draw`], in views, to `progress`.
+    /// Measures on the GPU what [`crate::sensitivity`] measures on the processor. `scene` must be made of a scene with
+    /// this `geometry`. Reports [`Stage::Draw`] to `progress`, in views.
     ///
-    /// The result has the same bits each time on the same GPU and driver. It is within rounding of the
-    /// processor's, except where a value lies within rounding of a threshold of the rasteriser.
+    /// The result has the same bits each time on the same GPU and driver. It is within rounding of the processor's
+    /// result, except where a value lies within rounding of a threshold of the rasteriser.
     ///
-    /// Frees the buffers that pictures were drawn with; the next picture makes its own again.
+    /// The buffers for pictures are freed. The next picture makes them again.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `scene` and `geometry` differ in length; [`Error::Codec`] if `progress`
-    /// cancelled the work; otherwise as [`Self::draw_async`].
+    /// [`Error::Parameter`] if `scene` and `geometry` differ in length; [`Error::Codec`] if `progress` cancelled the
+    /// work; otherwise as [`Self::draw_async`].
     pub async fn sensitivity_async(
         &mut self,
         scene: &GpuScene,
@@ -73,8 +73,8 @@ impl GpuRenderer {
         Ok(total)
     }
 
-    /// Makes a renderer that also works out moments. This one frees its buffers, since both together may not
-    /// fit.
+    /// Makes a renderer that also computes moments. This renderer frees its buffers, because the buffers of both together
+    /// may not fit.
     async fn measuring(&mut self) -> Result<Self> {
         self.plans.clear();
         self.work = None;
@@ -116,7 +116,7 @@ impl GpuRenderer {
     }
 }
 
-/// Returns the number that kernels give the first Gaussian of each chunk, and its place in the scene.
+/// Returns for each chunk the number that kernels give its first Gaussian, and the place of that Gaussian in the scene.
 fn places(scene: &GpuScene) -> Vec<[u32; 2]> {
     let mut place = 0;
     let of_chunk = |chunk: ChunkUniform| {
@@ -127,7 +127,7 @@ fn places(scene: &GpuScene) -> Vec<[u32; 2]> {
     scene.numbering().into_iter().map(of_chunk).collect()
 }
 
-/// Returns the place in the scene of the Gaussian that kernels call `number`.
+/// Returns the place in the scene of the Gaussian with the kernels' number `number`.
 fn place(places: &[[u32; 2]], number: u32) -> usize {
     let chunk = places.partition_point(|[first, _]| *first <= number).saturating_sub(1);
     places.get(chunk).map_or(number, |[first, place]| number - first + place) as usize

@@ -1,4 +1,4 @@
-//! The arrays of a scene on the GPU, Gaussian by Gaussian.
+//! Makes the arrays of a scene for the GPU, Gaussian by Gaussian.
 
 use half::f16;
 use lexisplat::sh::CHANNELS;
@@ -12,23 +12,23 @@ use super::constants::vectors;
 use super::part_layout::{ShKind, ShLayout};
 use super::path::ShPath;
 
-/// Smaller log scales are raised to this: the exponential of a smaller one is not a normal number.
+/// Smallest log scale. Smaller ones are raised to this, because their exponential is not a normal number.
 const LEAST_SCALE: f32 = -87.0;
-/// Opacity logits are clamped to this on both sides: beyond it the opacity is 0 or 1 in f32.
+/// Largest absolute opacity logit. Logits are clamped to it, because the opacity beyond it is 0 or 1 in `f32`.
 const MOST_LOGIT: f32 = 80.0;
-/// A Gaussian whose opacity logit is this far below that of `ALPHA_MIN` is invisible for sure.
+/// A Gaussian whose opacity logit is this far below that of `ALPHA_MIN` is certainly invisible.
 const LOGIT_SLACK: f32 = 0.01;
-/// Larger standard deviations are lowered to this. Their squares overflow, which the kernels test for.
+/// Largest standard deviation. Larger ones are lowered to this. Their squares overflow, and the kernels test for that.
 const MOST_SIGMA: f32 = 1e30;
 
-/// The SH of a scene, as the GPU will hold it.
+/// The SH of a scene, in the form in which the GPU will hold it.
 pub(super) enum ShData<'a> {
     Dense { scene: &'a Scene<'a>, half: bool },
     Codes(&'a Model),
 }
 
 impl<'a> ShData<'a> {
-    /// The SH of `scene` for `path`. Refuses a sparse path of a dense scene.
+    /// Returns the SH of `scene` for `path`. Returns an error for a sparse path of a dense scene.
     pub(super) fn new(scene: &'a Scene<'a>, path: ShPath) -> Result<Self> {
         match scene {
             _ if !path.is_sparse() => Ok(Self::Dense { scene, half: path == ShPath::DenseF16 }),
@@ -39,9 +39,9 @@ impl<'a> ShData<'a> {
         }
     }
 
-    /// How it is laid out.
+    /// Returns the layout of the SH.
     pub(super) fn layout(&self) -> ShLayout {
-        // Widths are at most 4, and atoms at most `lexisplat::MAX_ATOMS`.
+        // Numbers of bytes are at most 4, and numbers of atoms at most `lexisplat::MAX_ATOMS`.
         let number = |v: usize| u32::try_from(v).unwrap_or(u32::MAX);
         match self {
             Self::Dense { scene, half } => {
@@ -55,7 +55,7 @@ impl<'a> ShData<'a> {
         }
     }
 
-    /// Whether the SH-rest of Gaussian `i` is finite. Codes always are.
+    /// Returns whether the SH-rest of Gaussian `i` is finite. Codes are always finite.
     pub(super) fn finite(&self, i: usize) -> bool {
         match self {
             Self::Dense { scene: Scene::Dense(splats), .. } => {
@@ -67,8 +67,8 @@ impl<'a> ShData<'a> {
     }
 }
 
-/// Returns the position and the largest standard deviation of Gaussian `i`. The latter is -1 for one that is
-/// never drawn.
+/// Returns the position and the largest standard deviation of Gaussian `i`. The standard deviation is -1 for a Gaussian
+/// that is never drawn.
 pub(super) fn body(geometry: &Geometry, rest_finite: bool, i: usize) -> [f32; 4] {
     let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
     let (position, scales) = (geometry.positions[i], geometry.scales[i]);
@@ -116,7 +116,8 @@ pub(super) fn dense_row(scene: &Scene<'_>, i: usize, half: bool, out: &mut [u32]
     }
 }
 
-/// Copies a channel-major row to `out`, which is as long, with the channels of each coefficient side by side.
+/// Copies a channel-major row to `out`, which has the same length. In `out` the channels of each coefficient are side by
+/// side.
 pub(super) fn exact_row(row: &[f32], out: &mut [u32]) {
     let per_channel = row.len() / CHANNELS;
     for (k, out) in out.chunks_exact_mut(CHANNELS).enumerate() {

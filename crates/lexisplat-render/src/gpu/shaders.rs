@@ -1,4 +1,4 @@
-//! Compiles kernels and binds buffers to them.
+//! Compiles kernels, and binds buffers to them.
 
 use std::collections::HashMap;
 
@@ -17,7 +17,7 @@ pub(super) type ModuleText = (&'static str, &'static [&'static str], &'static [&
 const FRAME: &str = include_str!("kernels/frame.wgsl");
 const TILE: &str = include_str!("kernels/tile.wgsl");
 
-/// All kernels that drawing and comparing need but radiance, which depends on the scene.
+/// All kernels for drawing and comparing except radiance, which depends on the scene.
 pub(super) const DRAWING: [ModuleText; 10] = [
     ("cull", &["cull"], &[FRAME, include_str!("kernels/cull.wgsl")]),
     ("compact", &["compact"], &[FRAME, include_str!("kernels/compact.wgsl")]),
@@ -35,7 +35,7 @@ pub(super) const DRAWING: [ModuleText; 10] = [
     ("squared_error", &["squared_error"], &[FRAME, include_str!("kernels/squared_error.wgsl")]),
 ];
 
-/// Kernels that only measuring sensitivities needs.
+/// Kernels that are needed only to measure sensitivities.
 pub(super) const MEASURING: [ModuleText; 3] = [
     ("slots_of_entries", &["slots_of_entries"], &[FRAME, include_str!("kernels/slots_of_entries.wgsl")]),
     ("moments", &["tile_moments"], &[FRAME, TILE, include_str!("kernels/moments.wgsl")]),
@@ -51,8 +51,8 @@ pub(super) async fn kernels(gpu: &Gpu, modules: &[ModuleText]) -> Result<Kernels
     gpu.checked("kernels", || Ok(modules.iter().flat_map(of_module).collect())).await
 }
 
-/// A module of `text` after the shared declarations. What the device has against it is reported by the
-/// [`checked`](Gpu::checked) around it, as for [`pipeline`] and [`bind`].
+/// Returns a module of the shared declarations followed by `text`. The [`checked`](Gpu::checked) call around it reports
+/// what the device refuses; the same holds for [`pipeline`] and [`bind`].
 pub(super) fn compile(gpu: &Gpu, name: &str, text: &str) -> wgpu::ShaderModule {
     let source = format!("{}\n{text}", declarations());
     gpu.device().create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -61,7 +61,7 @@ pub(super) fn compile(gpu: &Gpu, name: &str, text: &str) -> wgpu::ShaderModule {
     })
 }
 
-/// The pipeline of one entry point.
+/// Returns the pipeline of one entry point.
 pub(super) fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry: &str) -> wgpu::ComputePipeline {
     gpu.device().create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some(entry),
@@ -77,7 +77,7 @@ pub(super) fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry: &str) -> w
     })
 }
 
-/// Binds all of each buffer, the first at binding `first`, the others after it.
+/// Returns bindings of whole buffers: the first buffer at binding `first`, the others after it.
 pub(super) fn all_from<'a>(
     first: u32,
     buffers: impl IntoIterator<Item = &'a Buffer>,
@@ -89,7 +89,7 @@ pub(super) fn all_from<'a>(
     (first..).zip(buffers).map(entry)
 }
 
-/// Binds `entries` to the one group of `pipeline`.
+/// Binds `entries` to the only bind group of `pipeline`.
 pub(super) fn bind<'a>(
     gpu: &Gpu,
     pipeline: &wgpu::ComputePipeline,

@@ -14,23 +14,23 @@ use super::timestamps::Timestamps;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Speed {
-    /// Bytes read plus bytes written in a second, copying arrays larger than any cache.
+    /// Bytes read plus bytes written in a second, when arrays larger than any cache are copied.
     pub copy: f64,
-    /// Single-precision operations in a second; a multiplication with an addition counts as two.
+    /// Single-precision operations in a second. A multiplication with an addition counts as two operations.
     pub arithmetic: f64,
 }
 
-/// Bytes copied, or as many as a binding holds if those are fewer.
+/// Number of bytes copied, or the size of a binding if that is smaller.
 const COPIED: u64 = 256 << 20;
-/// Bytes of a vector.
+/// Number of bytes of a vector.
 const VECTOR: u64 = 16;
-/// Operations of a lane in a round: four chains, four numbers, two operations.
+/// Number of operations of a lane in a round: four chains, four numbers, two operations.
 const OPERATIONS: f64 = 32.0;
-/// Lanes of the first and of the last measurement; there are more each time until one takes [`LONG_ENOUGH`].
+/// Number of lanes of the first and of the last measurement. It is raised until a measurement takes [`LONG_ENOUGH`].
 const LANES: std::ops::RangeInclusive<u32> = (1 << 16)..=(1 << 22);
-/// Seconds that a measurement should take.
+/// Duration that a measurement should have, in seconds.
 const LONG_ENOUGH: f64 = 2e-3;
-/// Runs of a measurement, of which the fastest counts.
+/// Number of runs of a measurement. The fastest run counts.
 const TIMES: usize = 5;
 
 /// Blocks on [`measure_speed_async`].
@@ -73,14 +73,14 @@ pub async fn measure_speed_async(gpu: &Gpu) -> Result<Speed> {
     }
 }
 
-/// Times single dispatches: by timestamps, or by the clock where the GPU has none.
+/// Times single dispatches by timestamps, or by the clock if the GPU has no timestamps.
 struct Stopwatch<'a> {
     gpu: &'a Gpu,
     timestamps: Option<Timestamps>,
 }
 
 impl Stopwatch<'_> {
-    /// Seconds of the fastest of [`TIMES`] runs.
+    /// Returns the duration of the fastest of [`TIMES`] runs, in seconds.
     async fn best(
         &self,
         pipeline: &wgpu::ComputePipeline,

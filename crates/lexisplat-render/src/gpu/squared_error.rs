@@ -1,4 +1,4 @@
-//! Comparing two pictures where they are.
+//! Compares two pictures on the GPU.
 
 use std::num::NonZeroU64;
 
@@ -11,7 +11,7 @@ use super::shaders::{all_from, bind};
 use super::uniforms::Extent;
 use super::work::{PIXEL, WORD};
 
-/// Pixels that a workgroup compares.
+/// Number of pixels that a workgroup compares.
 const GROUP_PIXELS: u32 = GROUP * ERROR_PIXELS;
 
 impl GpuRenderer {
@@ -24,14 +24,15 @@ impl GpuRenderer {
         self.gpu.block_on(self.squared_error_async(a, b, pixels))
     }
 
-    /// Returns what [`squared_error`](crate::squared_error()) returns of two pictures, within rounding: the sum of the
-    /// squared differences of all channels, each clipped to 0..1. Four bytes for every 4096 pixels are read back.
+    /// Returns the sum of the squared differences of all channels of two pictures, each clipped to 0..1. The result is
+    /// within rounding of that of [`squared_error`](crate::squared_error()). Four bytes for every 4096 pixels are read
+    /// back.
     ///
-    /// `a` and `b` are on the renderer's GPU and begin with `pixels` pixels, as
-    /// [`Frame::pixels`](super::Frame::pixels) does.
+    /// `a` and `b` must be on the renderer's GPU. Each must begin with `pixels` pixels in the layout of
+    /// [`Frame::pixels`](super::Frame::pixels).
     ///
     /// # Errors
-    /// [`Error::Parameter`] if a buffer is shorter than that; [`Error::Gpu`] if the device fails.
+    /// [`Error::Parameter`] if a buffer is shorter than `pixels` pixels; [`Error::Gpu`] if the device fails.
     pub async fn squared_error_async(&self, a: &wgpu::Buffer, b: &wgpu::Buffer, pixels: u32) -> Result<f64> {
         let gpu = &self.gpu;
         let size = u64::from(pixels) * PIXEL;
@@ -39,7 +40,7 @@ impl GpuRenderer {
             let expected = format!("buffers of at least {size} bytes");
             return Err(Error::parameter("pixels", pixels, expected));
         }
-        // A piece fits in a binding, and begins where WebGPU lets a binding begin.
+        // A piece fits in a binding, and begins at an offset that WebGPU allows.
         let fit = u32::try_from(gpu.max_binding() / PIXEL).unwrap_or(u32::MAX);
         let piece = (fit / GROUP_PIXELS * GROUP_PIXELS).max(GROUP_PIXELS);
         let bytes = u64::from(pixels.div_ceil(GROUP_PIXELS)) * WORD;

@@ -1,11 +1,11 @@
-//! Times of compute passes on the GPU's own clock.
+//! Times compute passes by the clock of the GPU.
 
 use crate::error::Result;
 
 use super::buffer::Buffer;
 use super::device::Gpu;
 
-/// Bytes of a timestamp.
+/// Number of bytes of a timestamp.
 const TIMESTAMP: u64 = 8;
 
 /// Buffers for the start and end of a number of passes.
@@ -15,12 +15,12 @@ pub(super) struct Timestamps {
     queries: wgpu::QuerySet,
     resolved: Buffer,
     back: Buffer,
-    /// Milliseconds of a tick.
+    /// Duration of a tick, in milliseconds.
     tick: f64,
 }
 
 impl Timestamps {
-    /// Makes buffers for `passes`; `None` where the GPU has no timestamps.
+    /// Makes buffers for `passes` passes; `None` if the GPU has no timestamps.
     pub(super) async fn new(gpu: &Gpu, passes: u32) -> Result<Option<Self>> {
         use wgpu::BufferUsages as U;
         if !gpu.device().features().contains(wgpu::Features::TIMESTAMP_QUERY) {
@@ -41,7 +41,7 @@ impl Timestamps {
         gpu.checked("timestamps", make).await.map(Some)
     }
 
-    /// What makes the GPU time a pass as number `pass`; `None` beyond the last number.
+    /// Returns the descriptor that makes the GPU time a pass as number `pass`; `None` beyond the last number.
     pub(super) fn writes(&self, pass: u32) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         (pass < self.passes).then(|| wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
@@ -57,7 +57,7 @@ impl Timestamps {
         encoder.copy_buffer_to_buffer(&self.resolved.raw, 0, &self.back.raw, 0, bytes);
     }
 
-    /// Start and end of the first `passes`, in milliseconds since the first one's start.
+    /// Returns the start and end of the first `passes` passes, in milliseconds since the start of the first pass.
     pub(super) async fn read(&self, gpu: &Gpu, passes: u32) -> Result<Vec<[f64; 2]>> {
         let times: Vec<u64> = gpu.read(&self.back, u64::from(2 * passes) * TIMESTAMP).await?;
         let first = times.first().copied().unwrap_or(0);

@@ -1,5 +1,5 @@
-//! Small structures that kernels read. They are laid out as in `frame.wgsl`, `scan.wgsl` and `sort.wgsl`, which
-//! describe the fields.
+//! Small structs that kernels read. Their layout is that of `frame.wgsl`, `scan.wgsl` and `sort.wgsl`, which describe the
+//! fields.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -25,11 +25,11 @@ pub(super) struct FrameUniform {
     pub(super) blocks: u32,
     pub(super) chunks: u32,
     pub(super) entries: u32,
-    /// View-space z beyond which something is drawn.
+    /// Near plane: only Gaussians of larger view-space z are drawn.
     pub(super) near: f32,
 }
 
-/// A part of the scene that fits in one binding.
+/// A chunk of the scene, which fits in one binding.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct ChunkUniform {
@@ -43,7 +43,7 @@ pub(super) struct ChunkUniform {
     pub(super) padding: u32,
 }
 
-/// Rows of tiles drawn at once.
+/// Rows of tiles that are drawn together.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Band {
@@ -53,7 +53,7 @@ pub(super) struct Band {
     pub(super) padding: u32,
 }
 
-/// The length of a scan: what a counter says, or `fixed_length` if that is not 0.
+/// Length of a scan: the value of a counter, or `fixed_length` if `fixed_length` is not 0.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Scan {
@@ -72,7 +72,7 @@ pub(super) struct Pass {
     pub(super) identity: u32,
 }
 
-/// How many pixels of two pictures are compared, laid out as in `squared_error.wgsl`.
+/// Number of pixels of two pictures that are compared, with the layout of `squared_error.wgsl`.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Extent {

@@ -1,4 +1,4 @@
-//! Buffers that drawing needs besides the scene. They are as large as the fullest view so far needed.
+//! Buffers for drawing, besides those of the scene. They are as large as the fullest view so far needed.
 
 use crate::error::Result;
 
@@ -8,24 +8,24 @@ use super::device::Gpu;
 use super::moments::MomentBuffers;
 use super::uniforms::FrameUniform;
 
-/// How much the buffers can hold.
+/// Capacity of the buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Capacity {
-    /// Blocks of Gaussians of the scene.
+    /// Number of blocks of Gaussians of the scene.
     pub(super) blocks: u32,
-    /// Chunks of the scene.
+    /// Number of chunks of the scene.
     pub(super) chunks: u32,
-    /// Gaussians that may be visible.
+    /// Number of Gaussians that may be visible.
     pub(super) slots: u32,
-    /// Entries in the tiles' lists of a band.
+    /// Number of entries in the tile lists of a band.
     pub(super) entries: u32,
-    /// Tiles of a band.
+    /// Number of tiles of a band.
     pub(super) tiles: u32,
-    /// Pixels of the picture.
+    /// Number of pixels of the picture.
     pub(super) pixels: u64,
 }
 
-/// The buffers, and how much they hold.
+/// The buffers and their capacity.
 #[derive(Debug)]
 pub(super) struct Work {
     pub(super) capacity: Capacity,
@@ -43,30 +43,31 @@ pub(super) struct Work {
     pub(super) colours: Buffer,
     pub(super) offsets: Buffer,
     pub(super) histogram: Buffer,
-    /// Depth keys, and with them slots. Each pass of the sort reads one of the two and writes the other.
+    /// Depth keys; with them `slot_values` has the slots. Each pass of the sort reads one of the two buffers and writes
+    /// the other.
     pub(super) slot_keys: [Buffer; 2],
     pub(super) slot_values: [Buffer; 2],
-    /// Tiles, and with them slots, sorted in the same way.
+    /// Tiles; with them `entry_values` has the slots. They are sorted in the same way.
     pub(super) entry_keys: [Buffer; 2],
     pub(super) entry_values: [Buffer; 2],
     pub(super) ranges: Buffer,
     pub(super) pixels: Buffer,
     pub(super) counters_back: Buffer,
-    /// There only while sensitivities are measured.
+    /// Buffers for moments, which exist only while sensitivities are measured.
     pub(super) moments: Option<MomentBuffers>,
 }
 
-/// Bytes of a 32-bit word.
+/// Number of bytes of a 32-bit word.
 pub(super) const WORD: u64 = 4;
-/// Bytes of a pixel: four floats.
+/// Number of bytes of a pixel: four floats.
 pub(super) const PIXEL: u64 = 16;
-/// Bytes of the largest element of an array with one element for each slot: of centres and conics.
+/// Number of bytes of the largest element of arrays with one element for each slot: those of centres and conics.
 pub(super) const SLOT_ELEMENT: u64 = 16;
-/// Bytes of an element of an array with one element for each entry.
+/// Number of bytes of an element of arrays with one element for each entry.
 pub(super) const ENTRY_ELEMENT: u64 = WORD;
 
 impl Work {
-    /// Makes the buffers, with those for moments where `measuring`.
+    /// Makes the buffers. If `measuring` is set, makes buffers for moments too.
     pub(super) async fn new(gpu: &Gpu, capacity: Capacity, measuring: bool) -> Result<Self> {
         gpu.checked("buffers for drawing", || Self::allocate(gpu, capacity, measuring)).await
     }

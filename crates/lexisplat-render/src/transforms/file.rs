@@ -1,4 +1,4 @@
-//! The fields of a `transforms.json` that are used, as they are written.
+//! The fields of a `transforms.json` that are used, in the form of the file.
 
 use serde::de::MapAccess;
 
@@ -6,16 +6,16 @@ use crate::cameras_json::MAX_CAMERAS;
 use crate::error::Result;
 use crate::json::{self, Fields, List, Object, Short, required, set};
 
-/// Most rows of a matrix.
+/// Largest number of rows of a matrix.
 const MAX_ROWS: usize = 4;
-/// Most entries of a list of distortion parameters. `OpenCV` has no model with more.
+/// Largest number of entries of a list of distortion parameters. No model of `OpenCV` has more.
 const MAX_DISTORTION: usize = 14;
-/// Camera models that are a pinhole where no distortion is given.
+/// Camera models that are pinhole cameras if no distortion is given.
 const PINHOLES: [&str; 3] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV"];
 /// Names of the fields of distortion, in the order of [`Lens::bent`].
 const BENT: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
-/// What a frame, or the file for all frames, says about the lens. Lengths are in pixels, angles in radians.
+/// Statements of a frame, or of the file for all frames, about the lens. Lengths are in pixels, angles in radians.
 #[derive(Debug, Default)]
 pub(super) struct Lens {
     model: Option<String>,
@@ -31,7 +31,7 @@ pub(super) struct Lens {
 }
 
 impl Lens {
-    /// Reads the value of `key` if that is a field of a lens. Returns whether it is.
+    /// Reads the value of `key` if it is a field of a lens. Returns whether it is.
     fn read<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error> {
         match key {
             "camera_model" => set(&mut self.model, map),
@@ -52,7 +52,7 @@ impl Lens {
         }
     }
 
-    /// Returns why this is not a pinhole; `None` if it is one.
+    /// Returns the reason why the lens is not a pinhole; `None` if it is one.
     pub(super) fn distortion(&self) -> Option<String> {
         if let Some(model) = self.model.as_deref().filter(|model| !PINHOLES.contains(model)) {
             return Some(format!("camera_model {model} is not supported"));
@@ -69,7 +69,7 @@ impl Lens {
         listed.then(|| "distortion (distortion_params) is not supported".into())
     }
 
-    /// Focal length along x, which is axis 0, or y, for pictures of `side` pixels along it.
+    /// Returns the focal length along x (`axis` 0) or y (`axis` 1), for pictures of `side` pixels along this axis.
     pub(super) fn focal(&self, axis: usize, side: u32) -> Result<Option<f64>, String> {
         if self.fl[axis].is_some() {
             return Ok(self.fl[axis]);
@@ -83,7 +83,7 @@ impl Lens {
     }
 }
 
-/// One photo.
+/// A frame of the file: one photo.
 #[derive(Debug)]
 pub(super) struct Frame {
     pub(super) path: String,
@@ -92,7 +92,7 @@ pub(super) struct Frame {
     pub(super) lens: Lens,
 }
 
-/// The file.
+/// The contents of the file.
 #[derive(Debug)]
 pub(super) struct Transforms {
     pub(super) lens: Lens,

@@ -1,11 +1,11 @@
-//! Reads `transforms.json`, as nerfstudio, instant-ngp and the `NeRF` synthetic scenes write it.
+//! Reads `transforms.json`, as written by nerfstudio, instant-ngp and the `NeRF` synthetic scenes.
 //!
-//! `transform_matrix` is camera to world with the camera's y up and z back (OpenGL), in the frame of
-//! the file. That is the frame of models trained by tools that read the file as it is, the 3DGS authors'
-//! loader among them (`gaussian-splatting/scene/dataset_readers.py`, `readCamerasFromTransforms`).
-//! **nerfstudio does not**: it centres and scales the scene, and `ns-export` leaves the model in that
-//! frame, recorded in `dataparser_transforms.json`, which is not read here. Such a model and its
-//! `transforms.json` do not fit together. `applied_transform` is not undone either.
+//! `transform_matrix` is camera to world with the camera's y up and z back (OpenGL), in the frame of the file. Models
+//! have this frame if they are trained by tools that use the file unchanged, such as the 3DGS authors' loader
+//! (`gaussian-splatting/scene/dataset_readers.py`, `readCamerasFromTransforms`). **nerfstudio is different**: it centres
+//! and scales the scene, and `ns-export` leaves the model in that frame. The frame is recorded in
+//! `dataparser_transforms.json`, which is not read here. Such a model and its `transforms.json` do not fit together.
+//! `applied_transform` is not undone either.
 //!
 //! Formats: nerfstudio's documentation, "Data conventions"; `nerfstudio_dataparser.py`.
 
@@ -26,19 +26,19 @@ use file::{Frame, Lens, Transforms};
 /// is not used.
 const NERF_FILES: [(&str, Split); 2] =
     [("transforms_train.json", Split::Train), ("transforms_test.json", Split::Test)];
-/// Largest difference of the last row of a matrix from (0, 0, 0, 1).
+/// Largest difference of the last row of a matrix from (0, 0, 0, 1), in each entry.
 const LAST_ROW_TOLERANCE: f64 = 1e-6;
 
-/// What to do about a lens that the rasteriser cannot draw through.
+/// Advice for a lens that the rasteriser cannot draw.
 const UNDISTORT: &str = "only pinhole cameras can be drawn from; undistort the photos (`colmap image_undistorter`) and use the cameras of that";
 
-/// Whether `files` are those of a `NeRF` synthetic folder.
+/// Returns whether `files` are those of a `NeRF` synthetic folder.
 pub(crate) fn is_nerf<F: ViewFiles + ?Sized>(files: &F) -> bool {
     files.has(NERF_FILES[0].0)
 }
 
-/// Reads `transforms_train.json` and, if it is there, `transforms_test.json` of a `NeRF` synthetic folder.
-/// Every camera is marked with its split. These files name no size, so `size_of` has to know it.
+/// Reads `transforms_train.json` and, if it exists, `transforms_test.json` of a `NeRF` synthetic folder. Every camera is
+/// marked with its split. These files state no size of pictures, so `size_of` must know it.
 ///
 /// # Errors
 /// [`lexisplat::Error::Io`] if a file cannot be read; otherwise as [`read_transforms_bytes`].
@@ -57,18 +57,17 @@ pub(crate) fn read_nerf_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<
     Ok(all)
 }
 
-/// Returns the cameras in `bytes`, in order, named by their `file_path` as written. `file` stands for them in
-/// errors.
+/// Returns the cameras in `bytes`, in order. Their names are their `file_path` as written. Errors call the bytes `file`.
 ///
-/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`. Those of the frame
-/// come before those of the file. If only x has one, it holds for both axes. Where `w` and `h` are missing,
-/// `size_of` is asked with the `file_path`. The principal point is ignored, see [`ViewSet::warnings`].
-/// `train_filenames` and `test_filenames` set the split. If there are no `test_filenames`, `val_filenames` count
-/// as test, as in nerfstudio's own evaluation.
+/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`. Those of a frame take
+/// precedence over those of the file. If only x has a focal length, it holds for both axes. If `w` or `h` is missing,
+/// `size_of` is asked with the `file_path`. The principal point is ignored, see [`ViewSet::warnings`]. `train_filenames`
+/// and `test_filenames` set the split. If there are no `test_filenames`, `val_filenames` count as test, as in
+/// nerfstudio's own evaluation.
 ///
 /// # Errors
-/// [`lexisplat::Error::Format`] naming the frame and the field, if the text is no such object, a value is out of
-/// range, a size is not known, the lens is not a pinhole's, or it is over [`crate::MAX_CAMERAS_BYTES`] or
+/// [`lexisplat::Error::Format`] naming the frame and the field, if the text is no such object, a value is out of range, a
+/// size is not known, the lens is not a pinhole's, or the bytes or the frames are over [`crate::MAX_CAMERAS_BYTES`] or
 /// [`crate::MAX_CAMERAS`].
 pub fn read_transforms_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result<ViewSet> {
     let transforms = Transforms::parse(bytes).map_err(|problem| Error::format(file, problem))?;
@@ -120,7 +119,7 @@ fn camera(
     let fx = along_x
         .or(all_x)
         .ok_or("neither 'fl_x' nor 'camera_angle_x' is there, so its focal length is not known")?;
-    // A frame's own focal length is not mixed with the file's for the other axis.
+    // A frame's own focal length is not combined with the file's focal length for the other axis.
     let fy = along_y.or(if along_x.is_some() { None } else { all_y }).unwrap_or(fx);
     let [right, up, back, position] = frame.columns()?;
     let rotation = std::array::from_fn(|row| [right[row], -up[row], -back[row]]);
@@ -133,7 +132,7 @@ fn camera(
 }
 
 impl Frame {
-    /// The matrix's columns: right, up, back and position.
+    /// Returns the columns of the matrix: right, up, back and position.
     fn columns(&self) -> Result<[[f64; 3]; 4], String> {
         if let [_, _, _, last] = self.matrix.as_slice() {
             let off = last.iter().zip([0.0, 0.0, 0.0, 1.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -149,7 +148,7 @@ impl Frame {
     }
 }
 
-/// The names of the frames of each split, where the file lists them.
+/// The names of the frames of each split, if the file lists them.
 struct Splits<'a> {
     train: HashSet<&'a str>,
     test: HashSet<&'a str>,

@@ -1,14 +1,14 @@
-//! Charts of lines and points over a logarithmic axis to base 2.
+//! Charts of lines and points. The x axis is logarithmic to base 2.
 
 use super::drawing::{Anchor, Figure, SIZE, Shape};
 use crate::numbers::number;
 
-/// Edges of the field that data is drawn in. Right of it is the legend.
+/// Edges of the field of the data. The legend is to the right of it.
 const LEFT: f64 = 74.0;
 const RIGHT: f64 = 670.0;
 const TOP: f64 = 50.0;
 const BOTTOM: f64 = 436.0;
-/// Left edge of the legend, width of the samples in it, and height of its lines.
+/// Left edge of the legend, width of its samples, and height of its lines.
 const LEGEND: f64 = 688.0;
 const SAMPLE: f64 = 26.0;
 const LEGEND_LINE: f64 = 21.0;
@@ -17,42 +17,43 @@ const TITLE_SIZE: f64 = 17.0;
 const LABEL_SIZE: f64 = 15.0;
 const TEXT_SIZE: f64 = 13.0;
 const POINT_SIZE: f64 = 11.0;
-/// Most letters of a title in its size. Longer ones are smaller.
+/// Largest number of letters of a title at its full size. Longer titles are smaller.
 const LONGEST_TITLE: f64 = 86.0;
-/// Width of lines, of lines of the grid, and radius of marks.
+/// Width of data lines, width of lines of the grid, and radius of marks.
 const LINE: f64 = 2.2;
 const THIN: f64 = 1.0;
 const MARK: f64 = 4.6;
 const BAND_OPACITY: u8 = 14;
-/// Most steps between the labels of the y axis.
+/// Largest number of steps between the labels of the y axis.
 const STEPS: f64 = 7.0;
-/// Most steps between labelled powers of two. A label has up to eight letters.
+/// Largest number of steps between labelled powers of two. A label has up to eight letters.
 const MOST_POWERS: f64 = 8.0;
-/// Least range of the y axis, for values that do not differ.
+/// Smallest range of the y axis, for values that do not differ.
 const LEAST_RANGE: f64 = 1.0;
-/// Largest number that is drawn. Along x its inverse is the smallest. Every measurement is well within.
+/// Largest number that is drawn. Along x its inverse is the smallest number. Every measurement is well within these
+/// limits.
 const LARGEST: f64 = 1e9;
-/// Colours of everything but data; the page's style sheet swaps them in its dark theme.
+/// Colours of everything but data. The page's style sheet replaces them in its dark theme.
 const INK: &str = "#1d1e22";
 const SOFT: &str = "#5c5f68";
 const GRID: &str = "#e4e2dc";
 
-/// The three colours.
+/// All three of these colours.
 #[cfg(test)]
 pub(super) const COLOURS: [&str; 3] = [INK, SOFT, GRID];
 
-/// Dashes of lines.
+/// Dash patterns of lines.
 pub(super) const SOLID: &str = "";
 pub(super) const DASHED: &str = "6 5";
 pub(super) const DOTTED: &str = "2 5";
 
-/// A mark at points: a regular polygon.
+/// The shape of marks at points: a regular polygon.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Mark {
     pub(super) corners: u8,
     /// Direction of the first corner in degrees, clockwise from the right.
     pub(super) turn: f64,
-    /// Distance of every second corner from the middle, in radii.
+    /// Distance of every second corner from the centre, in radii.
     pub(super) waist: f64,
 }
 
@@ -65,7 +66,7 @@ impl Mark {
         let corner = |k: u8| {
             let (sin, cos) =
                 (self.turn + 360.0 * f64::from(k) / f64::from(self.corners)).to_radians().sin_cos();
-            // Slim marks are larger, so that all look alike in size.
+            // Slim marks have a larger radius, so that all marks seem equally large.
             let radius = MARK / self.waist.sqrt() * if k % 2 == 1 { self.waist } else { 1.0 };
             [x + radius * cos, y + radius * sin]
         };
@@ -73,21 +74,21 @@ impl Mark {
     }
 }
 
-/// One point of a chart.
+/// A point of a chart.
 #[derive(Debug, Clone)]
 pub(super) struct Dot {
     pub(super) x: f64,
     pub(super) y: f64,
-    /// Ends of the band here.
+    /// Lower and upper end of the band at this point.
     pub(super) band: [f64; 2],
-    /// What is written above the point.
+    /// Text above the point.
     pub(super) label: String,
 }
 
-/// One line of a chart.
+/// A line of a chart.
 #[derive(Debug, Clone)]
 pub(super) struct Series {
-    /// What the legend calls it.
+    /// Name in the legend.
     pub(super) name: String,
     pub(super) colour: &'static str,
     pub(super) dash: &'static str,
@@ -103,7 +104,7 @@ pub(super) struct Chart {
     pub(super) title: String,
     pub(super) caption: String,
     pub(super) x: &'static str,
-    /// What is written after the numbers along x.
+    /// Text after the numbers along x.
     pub(super) x_unit: &'static str,
     pub(super) y: String,
     /// Whether the range of values starts at 0.
@@ -112,9 +113,9 @@ pub(super) struct Chart {
 }
 
 impl Chart {
-    /// Draws the chart. `None` if it has no points.
+    /// Draws the chart; `None` if it has no points.
     pub(super) fn draw(self) -> Option<Figure> {
-        // The axes cannot show other numbers.
+        // The axes cannot show numbers outside of these limits.
         let is_shown = |dot: &Dot| dot.x >= LARGEST.recip() && dot.x <= LARGEST && dot.y.abs() <= LARGEST;
         let mut all = self.series.clone();
         for series in &mut all {
@@ -152,7 +153,7 @@ impl Chart {
         Some(Figure { name: self.name, title: self.title, caption: self.caption, shapes: canvas.0 })
     }
 
-    /// The title, the axes and the grid.
+    /// Draws the title, the axes and the grid.
     fn frame(&self, axes: &Axes, canvas: &mut Canvas) {
         let digits = usize::from(axes.y.2 < 1.0);
         for value in ticks(axes.y) {
@@ -193,7 +194,7 @@ impl Canvas {
     }
 }
 
-/// The ranges of the axes: the first and the last label, and the step between two. Along x they are powers of two.
+/// The ranges of the axes: the first label, the last label, and the step between labels. Along x they are powers of two.
 #[derive(Clone, Copy)]
 struct Axes {
     x: (f64, f64, f64),
@@ -201,7 +202,7 @@ struct Axes {
 }
 
 impl Axes {
-    /// Axes that show all of `series`. `None` if there is nothing to show.
+    /// Returns axes that show all of `series`; `None` if there is nothing to show.
     fn new(series: &[Series], from_zero: bool) -> Option<Self> {
         let x = range(series.iter().flat_map(|series| &series.dots).map(|dot| dot.x.log2()))?;
         let y = range(series.iter().flat_map(|series| {
@@ -215,26 +216,26 @@ impl Axes {
         Some(Self { x: powers(x), y: (low, high, step) })
     }
 
-    /// The place of a point. Its x is a power of two.
+    /// Returns the place of a point. `x` is the exponent of a power of two.
     fn place(&self, x: f64, y: f64) -> [f64; 2] {
         let share = |value: f64, axis: (f64, f64, f64)| (value - axis.0) / (axis.1 - axis.0);
         [LEFT + share(x, self.x) * (RIGHT - LEFT), BOTTOM - share(y, self.y) * (BOTTOM - TOP)]
     }
 }
 
-/// The least and the greatest of `values` that are finite.
+/// Returns the smallest and the largest of the finite `values`.
 fn range(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
     let finite = values.filter(|value| value.is_finite());
     Some((finite.clone().reduce(f64::min)?, finite.reduce(f64::max)?))
 }
 
-/// The values that are labelled.
+/// Returns the values that have labels.
 fn ticks((first, last, step): (f64, f64, f64)) -> impl Iterator<Item = f64> {
     let all = std::iter::successors(Some(first), move |value| Some(value + step));
     all.take_while(move |value| *value <= last + step / 2.0)
 }
 
-/// The smallest round step that divides `spread` into at most [`STEPS`] parts.
+/// Returns the smallest round step that divides `spread` into at most [`STEPS`] parts.
 fn step(spread: f64) -> f64 {
     let least = spread / STEPS;
     let power = 10_f64.powf(least.log10().floor());
@@ -242,8 +243,8 @@ fn step(spread: f64) -> f64 {
     rounds.filter(|round| *round >= least).reduce(f64::min).unwrap_or(10.0 * power)
 }
 
-/// The first and the last power of two of an axis that shows `logarithms`, and the powers between two labels: enough
-/// that labels do not touch.
+/// Returns the first and the last power of two of an axis that shows `logarithms`, and the step between two labels. The
+/// step is large enough that labels do not touch.
 fn powers(logarithms: (f64, f64)) -> (f64, f64, f64) {
     let first = logarithms.0.floor();
     let spread = (logarithms.1 - first).ceil().max(1.0);

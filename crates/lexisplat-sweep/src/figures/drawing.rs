@@ -1,10 +1,10 @@
-//! What charts are drawn with: lines, areas and text, for a page as SVG and for papers as PDF.
+//! The elements of charts: lines, areas and text. They are drawn as SVG for a page and as PDF for papers.
 
 use maud::{Markup, html};
 
 use super::pdf::pdf;
 
-/// Where text stands relative to its place: its start, its middle or its end is there.
+/// The part of a text that is at the text's place: its start, its middle or its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Anchor {
     Start,
@@ -12,14 +12,14 @@ pub(super) enum Anchor {
     End,
 }
 
-/// One thing that is drawn. Places are in pixels from the left and from the top.
+/// An element of a drawing. Places are in pixels from the left and from the top.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Shape {
-    /// `dash` is the lengths drawn and left out in turn; empty for a whole line.
+    /// A line. `dash` has the lengths that are drawn and left out in turn; an empty `dash` draws the whole line.
     Line { points: Vec<[f64; 2]>, colour: &'static str, width: f64, dash: &'static str },
-    /// `opacity` is in percent.
+    /// A filled area. `opacity` is in percent.
     Area { points: Vec<[f64; 2]>, colour: &'static str, opacity: u8 },
-    /// Text on one line. It is `upright` if it runs from below to above.
+    /// Text on one line. It runs from below to above if it is `upright`.
     Text { at: [f64; 2], text: String, size: f64, anchor: Anchor, upright: bool, colour: &'static str },
 }
 
@@ -29,18 +29,18 @@ pub(super) const SIZE: [f64; 2] = [860.0, 500.0];
 /// A figure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Figure {
-    /// Name for files, without extension; safe on every system and unique among the figures of a sweep.
+    /// Name for files, without extension. It is safe on every system, and unique among the figures of a sweep.
     pub(crate) name: String,
-    /// What the figure shows, in a few words.
+    /// Title of the figure: its contents in a few words.
     pub(crate) title: String,
-    /// How to read it.
+    /// Explanation of how to read the figure.
     pub(crate) caption: String,
-    /// In the order of drawing.
+    /// Elements in the order of drawing.
     pub(super) shapes: Vec<Shape>,
 }
 
 impl Figure {
-    /// The figure as an element of a page, which scales with it.
+    /// Returns the figure as an SVG element of a page, which scales with the page.
     pub(crate) fn svg(&self) -> Markup {
         let [width, height] = SIZE;
         html! {
@@ -50,7 +50,7 @@ impl Figure {
         }
     }
 
-    /// The figure as a PDF of one page.
+    /// Returns the figure as a PDF of one page.
     pub(crate) fn pdf(&self) -> Vec<u8> {
         pdf(&self.shapes)
     }
@@ -86,7 +86,7 @@ impl Shape {
     }
 }
 
-/// A number with at most three digits after the point.
+/// Returns a number with at most three digits after the point.
 pub(super) fn number(value: f64) -> String {
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

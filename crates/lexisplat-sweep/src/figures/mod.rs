@@ -17,20 +17,21 @@ use super::grid::Grid;
 use super::measure::Measure;
 use super::{Fps, Method, Results, Setting, paper, unique};
 
-/// Most characters of a device's name on an axis. Captions have the whole name.
+/// Largest number of characters of a device's name on an axis. Captions have the whole name.
 const LONGEST_DEVICE: usize = 36;
-/// Explains the numbers at points, for captions.
+/// Explanation of the numbers at points, for captions.
 const TOLERANCES: &str =
     "Numbers at points are tolerances. Capped: at most so many nonzeros a Gaussian, without a tolerance.";
-/// Axes of several charts.
+/// Texts of axes that several charts share.
 const PSNR: &str = "PSNR against the original, dB";
 const RATIO: &str = "Comp Ratio, coefficients: SH-rest / mean nonzeros (log scale)";
-/// What is written after ratios.
+/// Sign after ratios.
 const TIMES: &str = "\u{d7}";
-/// The mark of the paper's numbers.
+/// Mark of the paper's numbers.
 const STAR: Mark = Mark { waist: 0.35, ..Mark::new(8, 45.0) };
 
-/// The colour and mark of a method: colours of Okabe and Ito (2008), which colour-blind people can tell apart.
+/// Returns the colour and the mark of a method. The colours are those of Okabe and Ito (2008), which colour-blind people
+/// can distinguish.
 fn look(method: Method) -> (&'static str, Mark) {
     match method {
         Method::Gs3d => ("#0072b2", CIRCLE),
@@ -46,7 +47,7 @@ const CIRCLE: Mark = Mark::new(24, 0.0);
 const SQUARE: Mark = Mark::new(4, 45.0);
 const TRIANGLE: Mark = Mark::new(3, -90.0);
 
-/// The dashes and mark of a kind of settings, and what follows the method's name in a legend.
+/// Returns the dashes and the mark of a kind of settings, and the text after the method's name in a legend.
 fn kind_look(kind: Kind) -> (&'static str, Mark, &'static str) {
     match kind {
         Kind::Tolerances => (SOLID, CIRCLE, ""),
@@ -55,13 +56,13 @@ fn kind_look(kind: Kind) -> (&'static str, Mark, &'static str) {
     }
 }
 
-/// Every colour in a figure. The page's style sheet swaps them in its dark theme.
+/// Returns every colour in a figure. The page's style sheet replaces them in its dark theme.
 #[cfg(test)]
 pub(super) fn colours() -> Vec<&'static str> {
     chart::COLOURS.into_iter().chain(Method::ALL.map(|method| look(method).0)).collect()
 }
 
-/// A line of one method through a kind of settings. `dot` gives x, y and the ends of the band of a setting.
+/// Returns a line of one method through a kind of settings. `dot` returns x, y and the ends of the band of a setting.
 fn line(
     grid: &Grid<'_>,
     method: Method,
@@ -74,7 +75,7 @@ fn line(
     let name = format!("{}{kind_name}", method.title());
     let dots = curve(grid, method, kind, column).into_iter().filter_map(|at| {
         let [x, y, low, high] = dot(&at)?;
-        // A tolerance is a number alone.
+        // The label of a tolerance is its number alone.
         let label = match at.setting {
             Setting::Tolerance(tolerance) => tolerance.to_string(),
             other => other.label(),
@@ -85,7 +86,7 @@ fn line(
     Series { name, colour, dash, mark: Some(mark), has_band, dots: dots.collect() }
 }
 
-/// Every figure that has something to show.
+/// Returns every figure that has something to show.
 pub(crate) fn figures(results: &Results) -> Vec<Figure> {
     let grid = Grid::new(results);
     let scenes = (0..grid.headings.len()).map(|column| quality(&grid, Some(column)));
@@ -93,7 +94,7 @@ pub(crate) fn figures(results: &Results) -> Vec<Figure> {
     for chart in [quality(&grid, None), speed(&grid), bytes(&grid)].into_iter().chain(scenes) {
         let Some(mut figure) = chart.draw() else { continue };
         figure.caption = format!("{} {}", figure.caption, results.how()).trim_end().to_owned();
-        // Scenes' names may differ only in letters that file names cannot have.
+        // The names of scenes may differ only in letters that file names cannot have.
         figure.name = unique(&figure.name, |name| {
             figures.iter().any(|other| other.name.to_lowercase() == name.to_lowercase())
         });
@@ -102,7 +103,8 @@ pub(crate) fn figures(results: &Results) -> Vec<Figure> {
     figures
 }
 
-/// PSNR over ratio along tolerances and capped nonzeros: over all scenes with the paper's means, or of one scene.
+/// Returns a chart of PSNR over ratio along tolerances and capped nonzeros: over all scenes with the paper's means, or of
+/// one scene.
 fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
     let kinds = [Kind::Tolerances, Kind::Caps];
     let mut series = Vec::new();
@@ -145,7 +147,7 @@ fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
     Chart { name, title, caption, x: RATIO, x_unit: TIMES, y: PSNR.to_owned(), from_zero: false, series }
 }
 
-/// Frames a second over ratio. Those of the original are dashed.
+/// Returns a chart of frames per second over ratio. The frame rates of the original are dashed.
 fn speed(grid: &Grid<'_>) -> Chart {
     let kinds = [Kind::Tolerances, Kind::Caps];
     let mut series = Vec::new();
@@ -180,7 +182,7 @@ fn speed(grid: &Grid<'_>) -> Chart {
     }
 }
 
-/// PSNR over the bytes of whole files.
+/// Returns a chart of PSNR over the bytes of whole files.
 fn bytes(grid: &Grid<'_>) -> Chart {
     let mut series = Vec::new();
     for kind in Kind::ALL {

@@ -1,13 +1,13 @@
-//! A drawing as a PDF of one page, for papers.
+//! Writes a drawing as a PDF of one page, for papers.
 //!
-//! Text is in Helvetica, which every PDF reader has. Letters beyond Windows code page 1252 become question marks.
+//! Text is in Helvetica, which every PDF reader has. Letters that Windows code page 1252 lacks become question marks.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::drawing::{Anchor, SIZE, Shape, number};
 
-/// Advance widths of Helvetica from the space to the tilde, in thousandths of the size of the text (Adobe, Core 14 AFM).
+/// Advance widths of Helvetica from the space to the tilde, in thousandths of the text size (Adobe, Core 14 AFM).
 const WIDTHS: [u16; 95] = [
     278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556, 556, 556,
     556, 556, 556, 556, 556, 278, 278, 584, 584, 584, 556, 1015, 667, 667, 722, 722, 667, 611, 778, 722, 278,
@@ -15,12 +15,12 @@ const WIDTHS: [u16; 95] = [
     556, 333, 556, 556, 500, 556, 556, 278, 556, 556, 222, 222, 500, 222, 833, 556, 556, 556, 556, 333, 500,
     278, 556, 500, 722, 500, 500, 500, 334, 260, 334, 584,
 ];
-/// Width of all other letters, that of a digit.
+/// Width of all other letters. It is the width of a digit.
 const OTHER_WIDTH: u16 = 556;
-/// `shapes` as a PDF file, one point for each pixel. The same shapes give the same bytes.
+/// Returns `shapes` as a PDF file. A pixel becomes a point. The same shapes give the same bytes.
 pub(super) fn pdf(shapes: &[Shape]) -> Vec<u8> {
     let [width, height] = SIZE.map(number);
-    // Pixels count from the top, points from the bottom.
+    // Pixels count from the top, and points from the bottom.
     let mut content = format!("1 0 0 -1 0 {height} cm 1 j\n");
     let mut opacities = BTreeSet::new();
     for shape in shapes {
@@ -55,7 +55,7 @@ pub(super) fn pdf(shapes: &[Shape]) -> Vec<u8> {
     file.into_bytes()
 }
 
-/// The operators that draw `shape`, in ASCII.
+/// Returns the operators that draw `shape`, in ASCII.
 fn operators(shape: &Shape) -> String {
     let path = |points: &[[f64; 2]]| {
         let word = |i| if i == 0 { "m" } else { "l" };
@@ -85,14 +85,14 @@ fn operators(shape: &Shape) -> String {
     }
 }
 
-/// Width of `text` in points.
+/// Returns the width of `text`, in points.
 fn width(text: &str, size: f64) -> f64 {
     let each = |byte: u8| byte.checked_sub(b' ').and_then(|i| WIDTHS.get(usize::from(i))).copied();
     let all: u32 = text.chars().map(|c| u32::from(each(code(c)).unwrap_or(OTHER_WIDTH))).sum();
     f64::from(all) / 1000.0 * size
 }
 
-/// The byte of a letter in Windows code page 1252.
+/// Returns the byte of a letter in Windows code page 1252.
 fn code(letter: char) -> u8 {
     match letter {
         '\u{a0}' => b' ',
@@ -108,7 +108,7 @@ fn code(letter: char) -> u8 {
     }
 }
 
-/// `text` within the parentheses of a PDF.
+/// Returns `text` as the contents of the parentheses of a PDF string.
 fn literal(text: &str) -> String {
     let byte = |byte| match byte {
         b'(' | b')' | b'\\' => format!("\\{}", char::from(byte)),
@@ -118,7 +118,7 @@ fn literal(text: &str) -> String {
     text.chars().map(code).map(byte).collect()
 }
 
-/// The red, green and blue of a colour such as `#0072b2`, each from 0 to 1.
+/// Returns the red, green and blue of a colour such as `#0072b2`, each from 0 to 1, as text.
 fn rgb(colour: &str) -> String {
     let part = |k: usize| colour.get(k..k + 2).and_then(|digits| u8::from_str_radix(digits, 16).ok());
     [1, 3, 5].map(|k| number(f64::from(part(k).unwrap_or(0)) / 255.0)).join(" ")

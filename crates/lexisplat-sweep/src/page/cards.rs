@@ -11,19 +11,19 @@ use crate::measure::Measure;
 use crate::numbers::signed;
 use crate::{SceneResult, Setting};
 
-/// The preset that has a card: the default of packed files.
+/// Preset with a card: the default of packed files.
 const PRESET: Preset = Preset::Balanced;
-/// What is written after ratios.
+/// Sign after ratios.
 const TIMES: &str = "\u{d7}";
 
-/// A measure over all models that were compressed at one setting.
+/// Returns the summary of a measure over all models that were compressed at one setting.
 fn over_models(grid: &Grid<'_>, setting: Setting, measure: Measure) -> Summary {
     let value = |(_, scene): (&str, &SceneResult)| measure.value(scene, Some(scene.point(setting)?));
     Summary::of(grid.scenes().filter_map(value).filter(|value| value.is_finite()))
 }
 
-/// By how much the same drawing of dense SH varied over the rounds beside a setting: the range over the mean, of the model
-/// where it is largest. Infinite if frames were not timed.
+/// Returns how much the frame rate of the same dense SH varied over the rounds of a setting: the range over the mean, for
+/// the model with the largest variation. It is infinite if frames were not timed.
 fn dense_noise(grid: &Grid<'_>, setting: Setting) -> f64 {
     let noise = grid.scenes().filter_map(|(_, scene)| {
         let dense = scene.point(setting)?.fps?.dense;
@@ -32,7 +32,7 @@ fn dense_noise(grid: &Grid<'_>, setting: Setting) -> f64 {
     noise.reduce(f64::max).unwrap_or(f64::INFINITY)
 }
 
-/// A card for each number of the main setting that there is, and one for packed files.
+/// Returns a card for each existing number of the main setting, and a card for packed files.
 pub(super) fn cards(grid: &Grid<'_>) -> Markup {
     let psnr = Measure::ToOriginal(Metric::Psnr);
     let mut cards = Vec::new();

@@ -1,7 +1,7 @@
-//! One self-contained HTML page about a sweep.
+//! A self-contained HTML page about a sweep.
 //!
-//! The page carries its styles, script, figures and pictures in itself and forbids itself any request.
-//! Without scripts it still shows everything. It follows the reader's light or dark theme.
+//! The page contains its styles, script, figures and pictures, and its security policy forbids every request. Without
+//! scripts it still shows everything. It follows the reader's light or dark theme.
 
 mod cards;
 mod parts;
@@ -18,7 +18,7 @@ use super::{Figure, PictureFiles, Results};
 const STYLE: &str = include_str!("sweep.css");
 const SCRIPT: &str = include_str!("sweep.js");
 
-/// The page as UTF-8 text; the same input gives the same page. `date` is printed as it is.
+/// Returns the page as UTF-8 text. The same input gives the same page. `date` is printed as it is.
 pub(crate) fn sweep_html(
     results: &Results,
     figures: &[Figure],

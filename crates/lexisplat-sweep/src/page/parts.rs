@@ -1,22 +1,22 @@
-//! What the page of a sweep and that of the demo share.
+//! Elements that the page of a sweep and the page of the demo share.
 //!
-//! A page carries its styles, script and pictures in itself, and its security policy forbids every request.
+//! A page contains its styles, script and pictures, and its security policy forbids every request.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use lexisplat_eval::Comparison;
 use maud::{Markup, PreEscaped, Render, html};
 
-/// The style sheet of all pages.
+/// Style sheet of all pages.
 const STYLE: &str = include_str!("../report/page.css");
-/// Forbids every request: all that a page needs is in it.
+/// Security policy, which forbids every request. A page contains everything that it needs.
 const POLICY: &str =
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
-/// The script of all pages: the line between two pictures.
+/// Script of all pages. It moves the line between two pictures.
 const SCRIPT: &str = include_str!("wipe.js");
 
-/// A whole page as UTF-8 text. `style` and `script` extend those of all pages.
+/// Returns a whole page as UTF-8 text. `style` and `script` are added to those of all pages.
 pub(crate) fn document(title: &str, style: &str, body: &Markup, script: &str) -> String {
     let page = html! {
         (PreEscaped("<!doctype html>\n"))
@@ -36,27 +36,27 @@ pub(crate) fn document(title: &str, style: &str, body: &Markup, script: &str) ->
     page.into_string()
 }
 
-/// A section with a heading. `id` is the id of the heading.
+/// Returns a section with a heading. `id` is the id of the heading.
 pub(crate) fn section(id: &str, heading: &str, content: &Markup) -> Markup {
     html! { section aria-labelledby=(id) { h2 id=(id) { (heading) } "\n" (content) } "\n" }
 }
 
-/// One figure of a summary.
+/// Returns a card with one number of a summary.
 pub(crate) fn card(value: impl Render, what: &str) -> Markup {
     html! { div class="card" { dt { (what) } dd { (value) } } }
 }
 
-/// A value in decibels on a card.
+/// Returns a value in decibels for a card.
 pub(crate) fn decibels(value: &str) -> Markup {
     html! { (value) " " small { "dB" } }
 }
 
-/// An image whose file of the kind `png` or `jpeg` is in the page itself.
+/// Returns an image. Its file, of the kind `png` or `jpeg`, is part of the page.
 pub(crate) fn image(kind: &str, class: &str, alt: &str, file: &[u8]) -> Markup {
     html! { img class=(class) alt=(alt) src={ "data:image/" (kind) ";base64," (BASE64_STANDARD.encode(file)) }; }
 }
 
-/// The scores of a view, to follow its name. Empty if it has none.
+/// Returns the scores of a view as text after its name. The text is empty if the view has no scores.
 pub(crate) fn scores(comparison: &Comparison, view: &str) -> String {
     match comparison.views.iter().find(|score| score.name == view) {
         Some(score) => match score.psnr {

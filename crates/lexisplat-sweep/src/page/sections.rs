@@ -1,4 +1,4 @@
-//! The page's sections, from top to bottom.
+//! The sections of the page, from top to bottom.
 
 use lexisplat_eval::format;
 use lexisplat_eval::montage::AMPLIFICATION;
@@ -12,18 +12,18 @@ use crate::picture::Part;
 use crate::table::Table;
 use crate::{Figure, PictureFiles, Results, tables};
 
-/// Tables with more rows than this scroll by themselves.
+/// Largest number of rows of a table without a scroll bar of its own.
 const TALL: usize = 24;
-/// Start of the names of figures of single scenes.
+/// Prefix of the names of figures of single scenes.
 const SCENE: &str = "scene-";
 
-/// What differs between the paper's way of counting and ours: titles and texts.
+/// Returns the differences between the paper's way of counting and ours: titles and texts.
 pub(super) fn notes() -> impl Iterator<Item = (&'static str, &'static str)> {
     let notes = include_str!("../notes.md").split("\n## ").skip(1);
     notes.filter_map(|note| note.split_once('\n')).map(|(title, text)| (title, text.trim()))
 }
 
-/// `1 scene`, `3 scenes`.
+/// Returns a count with its noun: `1 scene`, `3 scenes`.
 fn plural(count: usize, one: &str) -> String {
     let s = if count == 1 { "" } else { "s" };
     format!("{} {one}{s}", format::count(count as u64))
@@ -52,7 +52,7 @@ pub(super) fn header(grid: &Grid<'_>, date: Option<&str>) -> Markup {
     }
 }
 
-/// One view of one model at one setting.
+/// Returns one view of one model at one setting.
 fn view(results: &Results, files: &PictureFiles, parts: &[Part]) -> Option<Markup> {
     let scene = results.scenes.get(files.scene)?;
     let model = format!("{}, {}", scene.name, scene.method.title());
@@ -101,7 +101,7 @@ pub(super) fn pictures(results: &Results, pictures: &[(&PictureFiles, Vec<Part>)
     section("see", "Can you tell?", &content)
 }
 
-/// A figure as SVG within the page, which follows the theme.
+/// Returns a figure as SVG in the page. It follows the theme.
 fn figure(figure: &Figure) -> Markup {
     html! {
         figure class="panel chart" id={ "figure-" (figure.name) } {
@@ -112,13 +112,13 @@ fn figure(figure: &Figure) -> Markup {
     }
 }
 
-/// Figures over all scenes.
+/// Returns the figures over all scenes.
 pub(super) fn figures(figures: &[Figure]) -> Markup {
     let over_all = figures.iter().filter(|f| !f.name.starts_with(SCENE));
     section("figures", "At a glance", &html! { @for f in over_all { (figure(f)) } })
 }
 
-/// A table with its title and caption. A large one scrolls by itself.
+/// Returns a table with its title and caption. A large table has a scroll bar of its own.
 fn table(table: &Table) -> Markup {
     let id = format!("table-{}", table.name);
     let class = if table.rows.len() > TALL { "panel scroll grid tall" } else { "panel scroll grid" };
@@ -132,7 +132,7 @@ fn table(table: &Table) -> Markup {
     }
 }
 
-/// The means, beside the paper's, and what to know before comparing.
+/// Returns the means beside those of the paper, and what to know before comparing them.
 pub(super) fn means(results: &Results) -> Markup {
     let content = html! {
         (table(&tables::means(results)))

@@ -1,15 +1,15 @@
-//! The dictionary as data for the page's script, which draws each atom as a ball.
+//! The dictionary as data for the page's script. The script draws each atom as a ball.
 
 use lexisplat::Model;
 
-/// Atoms shown, the most used first.
+/// Number of atoms shown, the most used first.
 const SHOWN: usize = 180;
-/// Coefficients are whole numbers of this part of 1: a thousandth is finer than any screen shows.
+/// Number of steps in 1 for coefficients, which become whole numbers. A thousandth is finer than any screen shows.
 const STEPS: f32 = 1000.0;
 
-/// How often atoms are used.
+/// The numbers of uses of atoms.
 pub(super) struct Usage {
-    /// (atom, Gaussians that use it), the most used first.
+    /// (atom, number of Gaussians that use it), the most used first.
     pub(super) ranked: Vec<(usize, u64)>,
 }
 
@@ -32,7 +32,7 @@ impl Usage {
     }
 }
 
-/// `{"degree":3,"atoms":[[...],...]}` of the shown atoms, with coefficients in thousandths.
+/// Returns `{"degree":3,"atoms":[[...],...]}` of the shown atoms, with coefficients in thousandths.
 pub(super) fn json(model: &Model, usage: &Usage) -> String {
     let thousandths = |value: &f32| (value * STEPS).round();
     #[expect(clippy::cast_possible_truncation, reason = "a coefficient of a unit vector, in thousandths")]

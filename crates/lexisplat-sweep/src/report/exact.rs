@@ -1,4 +1,4 @@
-//! The parts of the page about the file in an exact layout: the paper's method and the bound on its error.
+//! The parts of the page about the file in an exact layout: the paper's method, and the bound on its error.
 
 use lexisplat::{CodeLayout, Layout, Pursuit, Record};
 use lexisplat_eval::format;
@@ -9,12 +9,12 @@ use super::{Report, packed, smaller};
 use crate::numbers;
 use crate::page::{card, section};
 
-/// What several parts need.
+/// Facts that several parts need.
 pub(super) struct Facts<'a> {
     report: &'a Report<'a>,
     record: &'a Record,
     gaussians: u64,
-    /// SH-rest values of a Gaussian.
+    /// Number of SH-rest values of a Gaussian.
     dim: usize,
     mean_nonzeros: f64,
 }
@@ -88,14 +88,15 @@ impl<'a> Facts<'a> {
         section("how", "How the exact file is made", &content)
     }
 
-    /// The bound on the error, if every Gaussian is within it.
+    /// Returns the bound on the error, if every Gaussian is within it.
     pub(super) fn bound(&self) -> Markup {
         let record = self.record;
         let is_kept = |tolerance: &f64| record.over_tolerance == 0 && record.max_residual <= *tolerance;
         let Some(tolerance) = record.tolerance.filter(is_kept) else { return html! {} };
         let Record { max_residual: max, rms_residual: rms, .. } = *record;
         let share = |v: f64| if tolerance > 0.0 { (v / tolerance * 100.0).clamp(0.0, 100.0) } else { 100.0 };
-        // An error of length 1 in SH, as the root mean square of the colour over the sphere: docs/METHOD.md.
+        // These factors turn an SH error of length 1 into the root mean square error of the colour over the sphere
+        // (docs/METHOD.md).
         let single = 1.0 / (4.0 * std::f64::consts::PI).sqrt();
         let all = 1.0 / (12.0 * std::f64::consts::PI).sqrt();
         let content = html! {
@@ -133,7 +134,7 @@ impl<'a> Facts<'a> {
                 *count += 1;
             }
         }
-        // Gaussians stored exactly have no code; they are counted as escapes.
+        // Gaussians that are stored exactly have no code. They are counted as escapes.
         counts[0] -= (codes.escapes().gaussians.len() as u64).min(counts[0]);
         let used = counts.iter().rposition(|&n| n > 0).map_or(1, |last| last + 1);
         let tallest = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
@@ -153,7 +154,7 @@ impl<'a> Facts<'a> {
                             small { @if k.is_multiple_of(5) { (k) } }
                         }
                     }
-                    // The text stands on the side that has more room.
+                    // The text is on the side that has more room.
                     b.mean.left[mean_at > 50.0] style=(format!("left:{mean_at:.2}%")) { (mean) }
                 }
             }

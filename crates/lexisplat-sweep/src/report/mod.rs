@@ -1,9 +1,8 @@
-//! One self-contained HTML page about a scene and two compressed files of it: the packed one first, then the
-//! one in an exact layout.
+//! A self-contained HTML page about a scene and two compressed files of it: first the packed file, then the file in an
+//! exact layout.
 //!
-//! The page carries its styles, its script and its pictures in itself, and its security policy forbids every
-//! request. Without scripts it shows everything except the dictionary. It follows the reader's light or dark
-//! theme.
+//! The page contains its styles, its script and its pictures, and its security policy forbids every request. Without
+//! scripts it shows everything except the dictionary. It follows the reader's light or dark theme.
 
 mod atoms;
 mod exact;
@@ -21,16 +20,16 @@ use crate::numbers;
 use crate::page::document;
 
 const SCRIPT: &str = include_str!("page.js");
-/// Quality of the pictures in the page, 1 to 100. Six views of the demo, 960 x 640 pixels and three pictures
-/// each, take about 2 MB with it.
+/// JPEG quality of the pictures in the page, 1 to 100. At this quality six views of the demo, 960 x 640 pixels and three
+/// pictures each, take about 2 MB.
 const JPEG_QUALITY: u8 = 85;
 
-/// Everything the page says.
+/// The contents of the page.
 #[derive(Debug, Clone, Copy)]
 pub struct Report<'a> {
-    /// The scene's name.
+    /// Name of the scene.
     pub title: &'a str,
-    /// The command line that makes the same files and page again.
+    /// Command line that makes the same files and the same page again.
     pub command: &'a str,
     /// Bytes of the PLY.
     pub ply_bytes: u64,
@@ -44,38 +43,38 @@ pub struct Report<'a> {
     pub learn_seconds: f64,
     /// Seconds spent on coding the exact file.
     pub code_seconds: f64,
-    /// Pictures of the packed file; may be fewer than the views compared.
+    /// Pictures of the packed file. They may be fewer than the views compared.
     pub pictures: &'a [Picture],
 }
 
 /// One compressed file of the scene.
 #[derive(Debug, Clone, Copy)]
 pub struct CompressedFile<'a> {
-    /// The file's name.
+    /// Name of the file.
     pub name: &'a str,
     /// Bytes of the file.
     pub bytes: u64,
-    /// Bytes of each part of the file by name, header included. Streams of a packed file share bytes, so these
-    /// may be fractions.
+    /// Bytes of each part of the file by name, header included. Streams of a packed file share bytes, so the numbers may
+    /// be fractions.
     pub attributes: &'a [(String, f64)],
-    /// Scores of its scene against the original.
+    /// Scores of the file's scene against the original.
     pub comparison: &'a Comparison,
 }
 
-/// One view of the original and of the packed scene, as JPEG files of one size: see [`jpeg`].
+/// One view of the original and of the packed scene, as JPEG files of the same size (see [`jpeg`]).
 #[derive(Debug, Clone)]
 pub struct Picture {
-    /// The view's name, as in [`CompressedFile::comparison`].
+    /// Name of the view, as in [`CompressedFile::comparison`].
     pub name: String,
-    /// The original scene.
+    /// Picture of the original scene.
     pub original: Vec<u8>,
-    /// The packed scene.
+    /// Picture of the packed scene.
     pub compressed: Vec<u8>,
-    /// Their difference, [`AMPLIFICATION`](lexisplat_eval::montage::AMPLIFICATION) times as bright.
+    /// Difference of both pictures, times [`AMPLIFICATION`](lexisplat_eval::montage::AMPLIFICATION).
     pub difference: Vec<u8>,
 }
 
-/// `image` as the bytes of a JPEG file of the quality that the page uses.
+/// Returns `image` as the bytes of a JPEG file of the page's quality.
 ///
 /// # Errors
 /// [`Error::Parameter`] if the image is empty or too large for the format.
@@ -89,7 +88,7 @@ pub fn jpeg(image: &Image) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The page as UTF-8 text. The same input gives the same page.
+/// Returns the page as UTF-8 text. The same input gives the same page.
 #[must_use]
 pub fn page(report: &Report<'_>) -> String {
     let exact = exact::Facts::new(report);
@@ -113,14 +112,14 @@ pub fn page(report: &Report<'_>) -> String {
     document(report.title, "", &body, SCRIPT)
 }
 
-/// Bytes of `before` over bytes of `after`, as `24.50×`.
+/// Returns bytes of `before` over bytes of `after`, such as `24.50×`.
 fn smaller(before: u64, after: u64) -> String {
     numbers::ratio(before as f64, after as f64)
 }
 
 #[cfg(test)]
 pub(crate) mod testing {
-    /// Every opened element is closed in order: enough of a parser for what the page uses.
+    /// Checks that every opened element is closed in order. This parser is sufficient for the elements of the page.
     pub(crate) fn check_nesting(page: &str) {
         let void = ["meta", "img", "input", "br", "rect", "line"];
         let mut open: Vec<&str> = Vec::new();

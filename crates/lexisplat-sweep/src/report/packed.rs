@@ -1,4 +1,4 @@
-//! The parts of the page about the packed file, and those that show both files beside each other.
+//! The parts of the page about the packed file, and the parts that show both files side by side.
 
 use lexisplat::sh::CHANNELS;
 use lexisplat_eval::montage::AMPLIFICATION;
@@ -10,13 +10,13 @@ use crate::numbers;
 use crate::page::{card, decibels, image, scores, section};
 use crate::table::{Row, Table};
 
-/// Bytes of a value in a PLY: every known trainer writes floats.
+/// Number of bytes of a value in a PLY. Every known trainer writes floats.
 const PLY_VALUE: u64 = 4;
-/// Narrowest part of a bar, in percent of the longest bar, that has room for its share in digits.
+/// Smallest part of a bar with room for its share in digits, in percent of the longest bar.
 const LABELLED: f64 = 6.0;
 
-/// The groups of bytes: the name, the class of their colour, and the first words of their parts' names in
-/// .lexi files. Everything else is in the last group.
+/// Groups of bytes: the name, the class of their colour, and the prefixes of the names of their parts in .lexi files. All
+/// other parts belong to the last group.
 const GROUPS: [(&str, &str, &[&str]); 7] = [
     ("View-dependent colour (SH)", "g-codes", &["codes", "escapes", "dictionary"]),
     ("Base colour", "g-base", &["dc"]),
@@ -29,10 +29,10 @@ const GROUPS: [(&str, &str, &[&str]); 7] = [
 /// Index of the last group.
 const OTHER: usize = GROUPS.len() - 1;
 
-/// Bytes of each group.
+/// Number of bytes of each group.
 pub(super) type Groups = [f64; GROUPS.len()];
 
-/// The groups of the PLY.
+/// Returns the groups of the PLY.
 pub(super) fn ply_groups(report: &Report<'_>) -> Groups {
     let values = [report.model.degree().rest(), CHANNELS, 3, 4, 3, 1];
     let mut groups = [0.0; GROUPS.len()];
@@ -43,7 +43,7 @@ pub(super) fn ply_groups(report: &Report<'_>) -> Groups {
     groups
 }
 
-/// The groups of a .lexi file.
+/// Returns the groups of a .lexi file.
 pub(super) fn lexi_groups(file: &CompressedFile<'_>) -> Groups {
     let mut groups = [0.0; GROUPS.len()];
     for (name, bytes) in file.attributes {
@@ -79,7 +79,7 @@ pub(super) fn header(report: &Report<'_>) -> Markup {
     }
 }
 
-/// The cards that say how close a file's pictures are to the original's.
+/// Returns the cards that tell how close the pictures of a file are to those of the original.
 pub(super) fn quality(comparison: &Comparison) -> Markup {
     html! {
         @if comparison.identical {
@@ -138,7 +138,7 @@ pub(super) fn steps() -> Markup {
     section("packing", "How the packed file is made", &content)
 }
 
-/// A bar as long as its share of `longest`, in parts as long as theirs.
+/// Returns a bar. Its length is its share of `longest`, and the lengths of its parts are in proportion to their bytes.
 fn bar(name: &str, total: u64, groups: &Groups, longest: f64) -> Markup {
     html! {
         p.label { (name) ", " (format::bytes(total)) }
@@ -153,7 +153,7 @@ fn bar(name: &str, total: u64, groups: &Groups, longest: f64) -> Markup {
     }
 }
 
-/// `bytes` without its fraction.
+/// Returns `bytes` rounded to a whole number.
 fn whole(bytes: f64) -> u64 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bytes of a part of a file")]
     let whole = bytes.max(0.0).round() as u64;

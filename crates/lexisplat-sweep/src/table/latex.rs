@@ -1,27 +1,29 @@
-//! Tables as LaTeX.
+//! Writes tables as LaTeX.
 
 use std::fmt::Write;
 
 use super::{Row, Table};
 use crate::numbers::DASH;
 
-/// Width of the text in points: the `article` class at 10 pt in one column.
+/// Width of the text, in points: the `article` class at 10 pt in one column.
 const TEXT_WIDTH: f64 = 345.0;
-/// Mean width of a character in points: Computer Modern at 9 pt, which is `\small` there. A digit takes 4.6 pt, a
-/// bold digit 5.3 pt.
+/// Mean width of a character, in points: Computer Modern at 9 pt, which is `\small` in that class. A digit takes 4.6 pt,
+/// a bold digit 5.3 pt.
 const CHARACTER: f64 = 5.2;
-/// Points between neighbouring columns: `\tabcolsep` is set to half of that.
+/// Space between neighbouring columns, in points. `\tabcolsep` is set to half of it.
 const COLUMN_GAP: f64 = 6.0;
-/// Most rows of a table that is on one page. A row takes 11 pt at 9 pt, and a page has 550 pt, with captions of some lines.
+/// Largest number of rows of a table on one page. A row takes 11 pt at 9 pt, and a page has 550 pt, including captions of
+/// some lines.
 const MOST_ROWS: usize = 36;
-/// Size of text of long tables, and the width of its characters beside `\\small`. Small letters of Computer Modern are wider
-/// than in proportion.
+/// Text size of long tables, and the width of its characters relative to `\\small`. Small letters of Computer Modern are
+/// wider than in proportion.
 const LONG_SIZE: &str = "\\scriptsize";
 const LONG_SCALE: f64 = 0.9;
-/// Smallest scale at which text stays readable. A table that needs a smaller one is split.
+/// Smallest scale at which text stays readable. A table that needs a smaller scale is split.
 const LEAST_SCALE: f64 = 7.0 / 9.0;
 
-/// Characters that LaTeX has words for. What this crate writes beyond ASCII needs no other engine so.
+/// Characters with LaTeX commands. Because of these commands, characters beyond ASCII that this crate writes need no
+/// other engine.
 const WORDS: [(char, &str); 22] = [
     ('&', "\\&"),
     ('%', "\\%"),
@@ -47,7 +49,7 @@ const WORDS: [(char, &str); 22] = [
     ('\u{a0}', "~"),
 ];
 
-/// `text` with every character that has a meaning in LaTeX replaced.
+/// Returns `text` with every character that has a meaning in LaTeX replaced.
 fn escape(text: &str) -> String {
     let shown =
         |c: char| WORDS.iter().find(|word| word.0 == c).map_or(c.to_string(), |word| word.1.to_owned());
@@ -58,14 +60,15 @@ fn points(characters: usize) -> f64 {
     characters as f64 * CHARACTER
 }
 
-/// The characters that a column takes: those of its longest cell, or of the longest word of its heading.
+/// Returns the number of characters in the width of a column: that of its longest cell, or of the longest word of its
+/// heading.
 fn characters(table: &Table, column: usize) -> usize {
     let cells = table.rows.iter().map(|row| row.cells[column].chars().count());
     let words = table.columns[column].heading.split(' ').map(|word| word.chars().count());
     cells.chain(words).max().unwrap_or(0)
 }
 
-/// The natural width of columns and their headings, in points.
+/// Returns the natural width of columns with their headings, in points.
 fn width(table: &Table, columns: &[usize]) -> f64 {
     let run_width = |(group, run): (&str, &[usize])| {
         let cells: f64 = run.iter().map(|&column| points(characters(table, column)) + COLUMN_GAP).sum();
@@ -74,8 +77,8 @@ fn width(table: &Table, columns: &[usize]) -> f64 {
     table.runs(columns).map(run_width).sum()
 }
 
-/// The columns of each part of a table that is too wide for one. Every part begins with `labels`, which name the rows. Columns
-/// of one group stay together where they can.
+/// Returns the columns of each part of a table that is too wide for one part. Every part begins with `labels`, which name
+/// the rows. Columns of one group stay together if they fit.
 fn parts(table: &Table, labels: &[usize], scale: f64) -> Vec<Vec<usize>> {
     let fits = |columns: &[usize]| width(table, columns) <= TEXT_WIDTH / scale;
     let others: Vec<usize> = (table.labels..table.columns.len()).collect();
@@ -92,19 +95,19 @@ fn parts(table: &Table, labels: &[usize], scale: f64) -> Vec<Vec<usize>> {
     parts
 }
 
-/// `l` for a column that names rows, `r` for one of numbers.
+/// Returns `l` for a column that names rows, and `r` for a column of numbers.
 fn side(table: &Table, column: usize) -> char {
     if column < table.labels { 'l' } else { 'r' }
 }
 
-/// A heading with each word on a line of its own.
+/// Returns a heading with each word on a line of its own.
 fn heading(table: &Table, column: usize) -> String {
     let words = table.columns[column].heading.split(' ');
     let words: Vec<String> = words.map(|word| format!("\\textbf{{{}}}", escape(word))).collect();
     format!("\\shortstack[{}]{{{}}}", side(table, column), words.join("\\\\"))
 }
 
-/// The head of a table with some of the columns: groups and headings, with rules above and below.
+/// Returns the head of a table with some of the columns: groups and headings, with rules above and below.
 fn head(table: &Table, columns: &[usize]) -> String {
     let mut out = "    \\toprule\n".to_owned();
     if columns.iter().any(|&column| !table.columns[column].group.is_empty()) {
@@ -123,7 +126,8 @@ fn head(table: &Table, columns: &[usize]) -> String {
     out
 }
 
-/// The lines of the rows that have anything in some of the columns, blocks separated. `above` is what stands above each block.
+/// Returns the lines of the rows that have a value in some of the columns. Blocks are separated. `above` returns the text
+/// above each block.
 fn lines(table: &Table, columns: &[usize], above: impl Fn(&Row) -> String) -> String {
     let has_any =
         |row: &&Row| columns.iter().any(|&column| column >= table.labels && row.cells[column] != DASH);
@@ -135,7 +139,7 @@ fn lines(table: &Table, columns: &[usize], above: impl Fn(&Row) -> String) -> St
             out.push_str(&above(first));
         }
         while let Some(row) = rows.next() {
-            // The paper's row stays below ours.
+            // The paper's row stays on the same page, below ours.
             let stays = if rows.peek().is_some_and(|next| next.is_paper) { "*" } else { "" };
             let cells: Vec<String> = columns.iter().map(|&column| cell(table, row, column)).collect();
             let _ = writeln!(out, "    {} \\\\{stays}", cells.join(" & "));
@@ -144,7 +148,7 @@ fn lines(table: &Table, columns: &[usize], above: impl Fn(&Row) -> String) -> St
     out
 }
 
-/// A cell in LaTeX. What is below zero has a minus sign, not a hyphen.
+/// Returns a cell in LaTeX. Negative numbers have a minus sign, not a hyphen.
 fn cell(table: &Table, row: &Row, column: usize) -> String {
     let text = match row.cells[column].strip_prefix('-') {
         Some(digits) if column >= table.labels => format!("$-${}", escape(digits)),
@@ -153,19 +157,19 @@ fn cell(table: &Table, row: &Row, column: usize) -> String {
     if row.is_paper { format!("\\textit{{{text}}}") } else { text }
 }
 
-/// The caption of a part of a table, and the label of the whole.
+/// Returns the caption of a part of a table. The first part also has the label of the table.
 fn caption(table: &Table, part: usize) -> String {
     let label = if part == 0 { format!("\\label{{tab:{}}}", table.name) } else { String::new() };
     format!("\\caption{{{}}}{label}", escape(&format!("{}. {}", table.title, table.caption)))
 }
 
-/// Floats of parts of the columns, each at most as wide as the text, also in a document of two columns.
+/// Returns floats of parts of the columns. Each is at most as wide as the text, also in a document of two columns.
 fn float(table: &Table) -> String {
     let labels: Vec<usize> = (0..table.labels).collect();
     let mut out = String::new();
     for (part, columns) in parts(table, &labels, LEAST_SCALE).iter().enumerate() {
         let sides: String = columns.iter().map(|&column| side(table, column)).collect();
-        // Estimates may be wrong, so the width is that of the table unless there is less room.
+        // Estimated widths may be wrong, so the table has its own width unless there is less room.
         let _ = write!(
             out,
             "\\begin{{table*}}[t]\n  \\centering\n  \\small\n  \\setlength{{\\emergencystretch}}{{3em}}\n  {}\n  \
@@ -180,8 +184,8 @@ fn float(table: &Table) -> String {
     out
 }
 
-/// Long tables of parts of the columns, over as many pages as they need. In a document of two columns they are set in one, for
-/// `longtable` cannot do otherwise. All labels but the last stand above their block.
+/// Returns long tables of parts of the columns, over as many pages as they need. In a document of two columns they are
+/// set in one column, because `longtable` requires this. All labels but the last are above their block.
 fn long(table: &Table) -> String {
     let above = table.labels.saturating_sub(1);
     let mut out = format!(
@@ -195,7 +199,7 @@ fn long(table: &Table) -> String {
         let sides: String = columns.iter().map(|&column| side(table, column)).collect();
         let name = |row: &Row| match row.cells[..above].join(", ") {
             name if name.is_empty() => name,
-            // Not wider than the table, whatever names are.
+            // The line is not wider than the table, for any names.
             name => format!(
                 "    \\multicolumn{{{count}}}{{l}}{{\\makebox[0pt][l]{{\\textit{{{}}}}}}} \\\\*\n",
                 escape(&name)

@@ -1,28 +1,28 @@
-//! A table that can be written as HTML or LaTeX.
+//! Tables that can be written as HTML or LaTeX.
 
 mod html;
 mod latex;
 
-/// One row.
+/// A row of a table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Row {
-    /// Text for each column, escaped for no format.
+    /// Text of each column, without escapes.
     pub(crate) cells: Vec<String>,
-    /// Whether the numbers are the paper's.
+    /// Whether the numbers are those of the paper.
     pub(crate) is_paper: bool,
     /// Whether a line above separates the row from the rows before it.
     pub(crate) rule: bool,
 }
 
 impl Row {
-    /// A row of `cells`. Control characters, which would break it, become spaces.
+    /// Returns a row of `cells`. Control characters, which would break the row, become spaces.
     pub(crate) fn new(cells: impl IntoIterator<Item = String>) -> Self {
         let one_line = |cell: String| cell.replace(char::is_control, " ");
         Self { cells: cells.into_iter().map(one_line).collect(), is_paper: false, rule: false }
     }
 }
 
-/// One column.
+/// A column of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Column {
     /// Heading over this column and neighbours of the same group; may be empty.
@@ -34,35 +34,35 @@ pub(crate) struct Column {
 /// A table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Table {
-    /// Name for files: lower case, digits, `-`.
+    /// Name for files: lower-case letters, digits and `-`.
     pub(crate) name: &'static str,
-    /// What the table shows, in a few words.
+    /// Title: the contents of the table in a few words.
     pub(crate) title: &'static str,
-    /// How to read it; may be empty.
+    /// Explanation of how to read the table; may be empty.
     pub(crate) caption: String,
-    /// From left to right.
+    /// Columns from left to right.
     pub(crate) columns: Vec<Column>,
-    /// How many columns, from the left, name the row.
+    /// Number of columns, from the left, that name the row.
     pub(crate) labels: usize,
-    /// From top to bottom.
+    /// Rows from top to bottom.
     pub(crate) rows: Vec<Row>,
 }
 
 impl Table {
-    /// A table without rows, with these headings of columns, of which the first `labels` name the row.
+    /// Returns a table without rows, with columns of these headings. The first `labels` columns name the row.
     pub(crate) fn new(name: &'static str, title: &'static str, labels: usize, headings: &[&str]) -> Self {
         let mut table = Self { name, title, labels, ..Self::default() };
         table.add_columns(headings.iter().map(|heading| ("", *heading)));
         table
     }
 
-    /// Appends columns of groups and headings.
+    /// Appends columns, given by groups and headings.
     pub(crate) fn add_columns<'a>(&mut self, columns: impl IntoIterator<Item = (&'a str, &'a str)>) {
         let column = |(group, heading): (&str, &str)| Column { group: group.into(), heading: heading.into() };
         self.columns.extend(columns.into_iter().map(column));
     }
 
-    /// Appends rows, and separates them from those above.
+    /// Appends rows, and separates them from the rows above.
     pub(crate) fn push_block(&mut self, rows: impl IntoIterator<Item = Row>) {
         let first = self.rows.len();
         self.rows.extend(rows);
@@ -71,21 +71,21 @@ impl Table {
         }
     }
 
-    /// Neighbouring columns of one group among `columns`.
+    /// Returns the runs of neighbouring columns of the same group among `columns`.
     fn runs<'a>(&self, columns: &'a [usize]) -> impl Iterator<Item = (&str, &'a [usize])> {
         let runs = columns.chunk_by(|&a, &b| self.columns[a].group == self.columns[b].group);
         runs.map(|run| (self.columns[run[0]].group.as_str(), run))
     }
 
-    /// A `table` element, without the caption.
+    /// Returns the table as a `table` element, without the caption.
     pub(crate) fn to_html(&self) -> maud::Markup {
         html::write(self)
     }
 
-    /// A `table` environment for a document of one or two columns that uses `booktabs` and `graphicx`, or, if it has more rows
-    /// than a page, a `longtable` for one that uses `longtable` too. It is never wider than its place: it is scaled
-    /// down, and if that would make it too small to read, split into several parts. Letters beyond what the
-    /// document's fonts have need another engine, such as `XeLaTeX`.
+    /// Returns the table as a `table` environment for a document of one or two columns that uses `booktabs` and
+    /// `graphicx`. A table with more rows than a page is a `longtable`, and the document must use `longtable` too. The
+    /// table is never wider than its place: it is scaled down, and if it would become too small to read, it is split into
+    /// several parts. Letters that the document's fonts lack need another engine, such as `XeLaTeX`.
     pub(crate) fn to_latex(&self) -> String {
         latex::write(self)
     }
@@ -95,7 +95,7 @@ impl Table {
 pub(super) mod testing {
     use super::*;
 
-    /// Text that every format has to escape, and every kind of row.
+    /// Returns a table with text that every format must escape, and with every kind of row.
     pub(crate) fn odd() -> Table {
         let mut table = Table::new("odd", "Odd & <ends>", 1, &["Scene"]);
         table.caption = "100% of a_b, \"quoted\" {braces}".to_owned();

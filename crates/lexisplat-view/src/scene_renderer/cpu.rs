@@ -1,4 +1,4 @@
-//! Drawing by the CPU.
+//! Draws by the CPU.
 
 use std::sync::Arc;
 

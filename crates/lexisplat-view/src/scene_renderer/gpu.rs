@@ -1,4 +1,4 @@
-//! Drawing by the GPU that also shows the window.
+//! Draws by the GPU that also shows the window.
 
 use std::sync::Arc;
 
@@ -19,8 +19,10 @@ pub(crate) struct GpuSceneRenderer {
 }
 
 impl GpuSceneRenderer {
+    /// Returns a renderer on `gpu`.
+    ///
     /// # Errors
-    /// If the driver rejects a kernel.
+    /// An error if the driver rejects a kernel.
     pub(crate) fn new(gpu: Gpu) -> Result<Self> {
         let renderer = GpuRenderer::new(&gpu)?;
         Ok(Self { gpu, renderer, scenes: [None, None] })
@@ -34,7 +36,7 @@ impl SceneRenderer for GpuSceneRenderer {
 
     fn set(&mut self, slot: Slot, model: Option<Arc<OpenModel>>) -> Result<()> {
         let place = &mut self.scenes[slot.index()];
-        // The old model is freed first: there may be no memory for both.
+        // The old model is freed first, because there may be no memory for both.
         *place = None;
         if let Some(model) = model {
             let scene = model.scene.scene();

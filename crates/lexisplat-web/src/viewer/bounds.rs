@@ -1,4 +1,4 @@
-//! Where a scene is, as far as it came.
+//! The bounds of a scene, from the parts that have come.
 
 use std::collections::BTreeMap;
 
@@ -7,18 +7,21 @@ use lexisplat_render::gpu::ScenePart;
 use lexisplat_render::{Camera, bulk, near_plane, orbit};
 use lexisplat_view::{DVec3, SceneBounds, Slot};
 
-/// Gaussians that are remembered of each part.
+/// Number of Gaussians of each part that are remembered.
 const SAMPLE: usize = 2048;
-/// Views of the orbit that is stepped through, as in `lexisplat view`, and their size, which the canvas replaces.
+/// Number of views of the orbit that is stepped through, as in `lexisplat view`, and their size, which the canvas
+/// replaces.
 const ORBIT: usize = 24;
 const ORBIT_SIZE: (u32, u32) = (1280, 720);
-/// The bounds are found again when so many times as many Gaussians were sampled, and when all came.
+/// Growth of the number of sampled Gaussians after which the bounds are found again. They are also found again when all
+/// Gaussians have come.
 const GROWTH: usize = 2;
-/// Gaussians count as seen at a place within this share of the picture's shorter side of it.
+/// Largest distance from a place of the picture at which Gaussians count as seen there, as a share of the picture's
+/// shorter side.
 const NEAR: f64 = 0.02;
-/// Opacity, after the sigmoid, of Gaussians that count as seen.
+/// Smallest opacity, after the sigmoid, of Gaussians that count as seen.
 const SOLID: f32 = 0.3;
-/// As many Gaussians in front of the point that is looked at are passed over, as a share of those near it.
+/// Share of the Gaussians near a place that are skipped in front of the point that is looked at.
 const PASSED: f64 = 0.1;
 
 /// A sample of the scene that is looked at.
@@ -26,12 +29,12 @@ const PASSED: f64 = 0.1;
 pub(super) struct Bounds {
     slot: Option<Slot>,
     parts: BTreeMap<usize, Geometry>,
-    /// Gaussians that the scene will have, and that came.
+    /// Numbers of Gaussians that the scene will have, and that have come.
     wanted: u64,
     came: u64,
-    /// Gaussians of the sample when the bounds were last found.
+    /// Number of Gaussians of the sample when the bounds were last found.
     found_at: usize,
-    /// The link to the view that was chosen last for the scene, while it was not changed.
+    /// Link to the view that was last chosen for the scene, until the user changes the view.
     pub(super) link: Option<String>,
 }
 
@@ -49,7 +52,7 @@ impl Bounds {
         self.parts.insert(index, part.sample((part.len() as usize / SAMPLE).max(1)));
         self.came += u64::from(part.len());
         let sampled: usize = self.parts.values().map(Geometry::len).sum();
-        // The view of a whole scene does not depend on the order in which its parts came.
+        // The view of a whole scene must not depend on the order in which its parts came.
         let is_whole = self.came == self.wanted;
         if sampled > 0 && (is_whole || sampled >= GROWTH * self.found_at) {
             self.found_at = sampled;
@@ -68,12 +71,12 @@ impl Bounds {
         all
     }
 
-    /// The bounds of the scene that `cameras` look at.
+    /// Returns the bounds of the scene at which `cameras` look.
     pub(super) fn of_scene(&self, cameras: &[Camera]) -> SceneBounds {
         Self::bounds(&self.geometry(), cameras)
     }
 
-    /// Cameras around the scene, and its bounds.
+    /// Returns cameras around the scene, and the bounds of the scene.
     pub(super) fn around(&self) -> (Vec<Camera>, SceneBounds) {
         let geometry = self.geometry();
         let cameras = orbit(&geometry, ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
@@ -84,7 +87,7 @@ impl Bounds {
         SceneBounds::new(bulk(geometry), near_plane(geometry), cameras)
     }
 
-    /// The point of the scene that `camera` sees at a place, in shares of its picture.
+    /// Returns the point of the scene that `camera` sees at a place, given in shares of its picture.
     pub(super) fn seen(&self, camera: &Camera, x: f64, y: f64) -> Option<DVec3> {
         let (width, height) = (f64::from(camera.width), f64::from(camera.height));
         let place = [x * width - width / 2.0, y * height - height / 2.0];

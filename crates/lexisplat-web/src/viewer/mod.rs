@@ -15,15 +15,15 @@ use self::bounds::Bounds;
 use self::screen::{Drawn, Screen};
 use crate::thrown;
 
-/// Shows one or two scenes on a canvas. No method may be called before the promise of another one settles.
+/// Shows one or two scenes on a canvas. No method may be called before the promise of another method settles.
 #[wasm_bindgen]
 pub struct Viewer {
     state: State,
     screen: Screen,
     bounds: Bounds,
-    /// What the page says of each scene, as it is given back by the report.
+    /// Facts about each scene from the page. The report returns them.
     infos: [Option<Value>; 2],
-    /// Whether the cameras are of a file.
+    /// Whether the cameras come from a file.
     given: bool,
     size: (u32, u32),
     drawn: Option<Drawn>,
@@ -37,10 +37,10 @@ impl std::fmt::Debug for Viewer {
 
 #[wasm_bindgen]
 impl Viewer {
-    /// Opens WebGPU for `canvas`. `options` is a JSON object; its `background` is a colour of three numbers from 0 to 1.
+    /// Opens WebGPU for `canvas`. `options` is a JSON object. Its `background` is a colour of three numbers from 0 to 1.
     ///
     /// # Errors
-    /// Why this browser cannot draw.
+    /// An error that tells why this browser cannot draw.
     pub async fn create(canvas: HtmlCanvasElement, options: String) -> Result<Viewer, JsError> {
         let options: Value = serde_json::from_str(&options).map_err(thrown)?;
         let colour = |k: usize| options["background"][k].as_f64().unwrap_or(0.0);
@@ -58,10 +58,10 @@ impl Viewer {
         })
     }
 
-    /// Carries out the words of a script; see [`lexisplat_view::SCRIPT_WORDS`]. Those about files are refused.
+    /// Carries out the words of a script; see [`lexisplat_view::SCRIPT_WORDS`]. Words about files are refused.
     ///
     /// # Errors
-    /// The word that is wrong. Words before it are carried out only if all are right.
+    /// An error with the word that is wrong. No word is carried out unless all words are right.
     pub fn run(&mut self, words: &str) -> Result<(), JsError> {
         let commands = script::parse(words).map_err(thrown)?;
         let not_here = |command: &&Command| {
@@ -83,44 +83,45 @@ impl Viewer {
         Ok(())
     }
 
-    /// Carries out the command of the key that `KeyboardEvent.key` names. Returns whether it has one.
+    /// Carries out the command of a key, named as in `KeyboardEvent.key`. Returns whether the key has a command.
     pub fn key(&mut self, key: &str) -> bool {
         let Some(command) = keys::command_of_key(key) else { return false };
         self.state.apply(&command);
         true
     }
 
-    /// Turns the scene around the pivot, in radians to the right and down.
+    /// Turns the scene around the pivot to the right and down, in radians.
     pub fn orbit(&mut self, right: f64, down: f64) {
         self.moved([right, down], |camera| camera.orbit(right, down));
     }
 
-    /// Turns the view around the camera, in radians to the right and down.
+    /// Turns the view around the camera to the right and down, in radians.
     pub fn look(&mut self, right: f64, down: f64) {
         self.moved([right, down], |camera| camera.look(right, down));
     }
 
-    /// Moves the scene along, in shares of the picture's shorter side.
+    /// Moves the scene to the right and down, in shares of the picture's shorter side.
     pub fn pan(&mut self, right: f64, down: f64) {
         self.moved([right, down], |camera| camera.pan(right, down));
     }
 
-    /// Multiplies the distance of the pivot.
+    /// Multiplies the distance of the pivot by `factor`.
     pub fn dolly(&mut self, factor: f64) {
         if factor > 0.0 {
             self.moved([factor, 0.0], |camera| camera.dolly(factor));
         }
     }
 
-    /// Flies, in radii of the scene.
+    /// Flies to the right, up and forward, in radii of the scene.
     pub fn fly(&mut self, right: f64, up: f64, forward: f64) {
         self.moved([right + up, forward], |camera| camera.fly(DVec3::new(right, up, forward)));
     }
 
-    /// Makes what is seen at a place the pivot, in shares of the canvas from its left and upper edge.
+    /// Makes the point that is seen at a place the pivot. The place is in shares of the canvas from its left and upper
+    /// edge.
     pub fn focus(&mut self, x: f64, y: f64) {
         let Some(camera) = self.state.camera(self.size.0, self.size.1) else { return };
-        // Where two pictures lie side by side, a place is one of either.
+        // If two pictures lie side by side, a place belongs to one of them.
         let columns = f64::from(self.state.arrangement().columns());
         if let Some(point) = self.bounds.seen(&camera, (x * columns).fract(), y) {
             self.state.focus(point);
@@ -133,17 +134,17 @@ impl Viewer {
         }
     }
 
-    /// Sets the size of the canvas, in pixels of the device.
+    /// Sets the size of the canvas, in device pixels.
     pub fn resize(&mut self, width: u32, height: u32) {
         self.size = (width.max(1), height.max(1));
         self.screen.resize(self.size);
         self.drawn = None;
     }
 
-    /// Takes the cameras of INRIA's `cameras.json`. They are what `[` and `]` step through.
+    /// Takes the cameras of INRIA's `cameras.json`. `[` and `]` step through them.
     ///
     /// # Errors
-    /// What is wrong with the bytes.
+    /// An error that tells what is wrong with the bytes.
     pub fn cameras(&mut self, bytes: &[u8]) -> Result<(), JsError> {
         let cameras = read_cameras_bytes("cameras.json", bytes).map_err(thrown)?;
         self.given = true;
@@ -152,11 +153,11 @@ impl Viewer {
         Ok(())
     }
 
-    /// Begins a scene in a slot, 0 or 1, in place of the one that was there. `info` is a JSON object that the report gives back;
-    /// its `shown` is the number of Gaussians that will come.
+    /// Begins a scene in a slot, 0 or 1, and replaces the scene in this slot. `info` is a JSON object that the report
+    /// returns. Its `shown` is the number of Gaussians that will come.
     ///
     /// # Errors
-    /// [`Chunk.form`](crate::Chunk::form) did not give these bytes, or the GPU refuses.
+    /// An error if the bytes are not from [`Chunk.form`](crate::Chunk::form), or if the GPU refuses.
     pub async fn form(&mut self, slot: usize, bytes: Vec<u8>, info: String) -> Result<(), JsError> {
         let slot = slot_of(slot)?;
         let form = SceneForm::from_bytes(&bytes).map_err(thrown)?;
@@ -166,7 +167,7 @@ impl Viewer {
         self.infos[slot.index()] = Some(info);
         let was_open = self.infos.iter().flatten().count() > 1 || slot == Slot::Second;
         self.state.set_open([0, 1].map(|k| self.infos[k].is_some()));
-        // A scene alone, or a new first one, is looked at from its own place.
+        // The view is set for a scene that is alone or is a new first scene.
         if !was_open || slot == Slot::First {
             self.bounds.begin(slot, wanted);
         }
@@ -174,10 +175,10 @@ impl Viewer {
         Ok(())
     }
 
-    /// Puts part `index` of the scene of a slot, in place of the one that was there.
+    /// Puts part `index` of the scene of a slot, and replaces the part with this index.
     ///
     /// # Errors
-    /// [`Chunk.part`](crate::Chunk::part) did not give these bytes, or the GPU refuses.
+    /// An error if the bytes are not from [`Chunk.part`](crate::Chunk::part), or if the GPU refuses.
     pub async fn part(&mut self, slot: usize, index: usize, bytes: Vec<u8>) -> Result<(), JsError> {
         let slot = slot_of(slot)?;
         let part = ScenePart::from_bytes(&bytes).map_err(thrown)?;
@@ -189,7 +190,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// Looks at the scene as far as it came, unless the view was changed.
+    /// Frames the part of the scene that has come, unless the user has changed the view.
     fn look_at_scene(&mut self) {
         if self.given {
             return;
@@ -201,7 +202,7 @@ impl Viewer {
         if is_untouched {
             self.bounds.link = Some(self.state.link());
         } else {
-            // What was a link a moment ago is one still.
+            // The text was made by `link`, so it is a valid link.
             let _ = self.state.apply_link(&before);
         }
     }
@@ -209,7 +210,7 @@ impl Viewer {
     /// Removes the scene of a slot.
     ///
     /// # Errors
-    /// If there is no such slot.
+    /// An error if there is no such slot.
     pub fn remove(&mut self, slot: usize) -> Result<(), JsError> {
         let slot = slot_of(slot)?;
         self.screen.remove(slot);
@@ -219,15 +220,15 @@ impl Viewer {
         Ok(())
     }
 
-    /// Draws and shows what changed since the last time, with both sides of pictures multiplied by `scale`, at most 1. Returns
+    /// Draws and shows changes since the last call, with both sides of pictures multiplied by `scale`, at most 1. Returns
     /// whether there was anything to do.
     ///
     /// # Errors
-    /// What the GPU has against it.
+    /// Errors of the GPU.
     pub async fn draw(&mut self, scale: f64) -> Result<bool, JsError> {
         let Some(camera) = self.state.camera(self.size.0, self.size.1) else { return Ok(false) };
         let view = screen::View {
-            // Coarse pictures are of a moving view, where only what is seen is drawn.
+            // Coarse pictures are of a moving view. Only visible models are drawn then.
             wanted: if scale < 1.0 { self.state.arrangement().mode.needs() } else { [true; 2] },
             camera,
             options: self.state.options(),
@@ -242,7 +243,7 @@ impl Viewer {
         Ok(true)
     }
 
-    /// What is shown and what it took, as JSON.
+    /// Returns the state of the view and statistics as JSON.
     #[must_use]
     pub fn report(&self) -> String {
         let (arrangement, options) = (self.state.arrangement(), self.state.options());
@@ -285,31 +286,32 @@ impl Viewer {
         value.to_string()
     }
 
-    /// A link to the very view, for the fragment of an address.
+    /// Returns a link to exactly the view shown, for the fragment of an address.
     #[must_use]
     pub fn link(&self) -> String {
         self.state.link()
     }
 
-    /// Shows what a text of [`Self::link`] says.
+    /// Applies a text of [`Self::link`].
     ///
     /// # Errors
-    /// The word that is wrong. Nothing is changed then.
+    /// An error with the word that is wrong. Nothing changes in this case.
     pub fn set_link(&mut self, text: &str) -> Result<(), JsError> {
         self.state.apply_link(text).map_err(thrown)
     }
 
-    /// What is shown as `{width, height, data}`, with red, green, blue and opacity of each pixel, 8 bits each.
+    /// Returns the picture shown as `{width, height, data}`, with red, green, blue and opacity of each pixel, 8 bits
+    /// each.
     ///
     /// # Errors
-    /// If nothing was drawn yet, or what the GPU has against it.
+    /// An error if nothing was drawn yet, and errors of the GPU.
     pub async fn picture(&mut self) -> Result<Object, JsError> {
         let drawn = self.drawn.as_ref().ok_or_else(|| thrown("nothing is shown yet"))?;
         let (width, height, pixels) = self.screen.picture(drawn).await.map_err(thrown)?;
         let data: Vec<u8> = pixels.iter().flat_map(|&[r, g, b]| [r, g, b, u8::MAX]).collect();
         let out = Object::new();
         let set = |name: &str, value: JsValue| {
-            // An object that was just made takes every property.
+            // A new object accepts every property.
             let _ = Reflect::set(&out, &JsValue::from(name), &value);
         };
         set("width", width.into());

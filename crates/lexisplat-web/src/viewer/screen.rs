@@ -1,4 +1,4 @@
-//! The canvas and the GPU that draws on it.
+//! The canvas, and the GPU that draws on it.
 
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, SceneBytes, SceneForm, ScenePart};
 use lexisplat_render::{Camera, RenderOptions};
@@ -6,18 +6,18 @@ use lexisplat_view::{Arrangement, Composer, Composition, Picture, Presenter, Rgb
 use web_sys::HtmlCanvasElement;
 use wgpu::CurrentSurfaceTexture;
 
-/// What goes wrong, in words for people.
+/// Result with an error in words for people.
 type Result<T> = std::result::Result<T, String>;
 
-/// Channels of a pixel.
+/// Number of channels of a pixel.
 const CHANNELS: f64 = 3.0;
 
-/// What a picture on the canvas depends on.
+/// All values on which a picture on the canvas depends.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct View {
     /// The models to draw, if they are open.
     pub(super) wanted: [bool; 2],
-    /// At the size of the canvas.
+    /// The camera, at the size of the canvas.
     pub(super) camera: Camera,
     pub(super) options: RenderOptions,
     pub(super) arrangement: Arrangement,
@@ -30,16 +30,16 @@ pub(super) struct View {
 pub(super) struct Drawn {
     view: View,
     pictures: [Option<Picture>; 2],
-    /// Gaussians that may touch each picture.
+    /// Number of Gaussians that may touch each picture.
     pub(super) visible: [Option<u32>; 2],
     pub(super) milliseconds: f64,
-    /// The second picture against the first, in decibels.
+    /// PSNR of the second picture against the first, in dB.
     pub(super) psnr: Option<f64>,
     pub(super) identical: bool,
 }
 
 impl Drawn {
-    /// Whether this is `view`, or a finer picture of it.
+    /// Returns whether this is `view`, or a finer picture of it.
     pub(super) fn shows(&self, view: &View) -> bool {
         self.has_pictures_of(view) && self.view.arrangement == view.arrangement
     }
@@ -83,7 +83,7 @@ impl Screen {
         let (device, queue) = opened.map_err(|e| e.to_string())?;
         let gpu = Gpu::from_device(&adapter, device, queue);
         let capabilities = surface.get_capabilities(&adapter);
-        // Pictures are sRGB already.
+        // The pictures are sRGB already.
         let format =
             capabilities.formats.iter().find(|format| !format.is_srgb()).or(capabilities.formats.first());
         let format = *format.ok_or_else(|| "the canvas has no format that can be drawn to".to_owned())?;
@@ -102,7 +102,7 @@ impl Screen {
         self.surface.configure(self.gpu.device(), &self.configuration);
     }
 
-    /// Begins a scene in `slot`. The old one is freed first: there may be no memory for both.
+    /// Begins a scene in `slot`. The old scene is freed first, because there may be no memory for both.
     pub(super) async fn begin(&mut self, slot: Slot, form: &SceneForm) -> Result<()> {
         self.remove(slot);
         let scene = GpuScene::of_parts_async(&self.gpu, form).await.map_err(|e| e.to_string())?;
@@ -121,7 +121,7 @@ impl Screen {
         self.scenes[slot.index()] = None;
     }
 
-    /// Draws and shows `view`. Takes the pictures of `before` if they are what is wanted.
+    /// Draws and shows `view`. Reuses the pictures of `before` if they are those of `view`.
     pub(super) async fn draw(&mut self, view: View, before: Option<Drawn>) -> Result<Drawn> {
         let drawn = match before.filter(|before| before.has_pictures_of(&view)) {
             Some(before) => {
@@ -163,7 +163,7 @@ impl Screen {
         let Some(bound) = self.presenter.bind(&composition) else { return Ok(()) };
         let texture = match self.surface.get_current_texture() {
             CurrentSurfaceTexture::Success(texture) | CurrentSurfaceTexture::Suboptimal(texture) => texture,
-            // The canvas is not seen, or will be drawn to again when it has its size.
+            // The canvas is not visible, or will be drawn again when it has its size.
             CurrentSurfaceTexture::Timeout
             | CurrentSurfaceTexture::Occluded
             | CurrentSurfaceTexture::Outdated => {
@@ -198,7 +198,7 @@ impl Screen {
         Ok(())
     }
 
-    /// Where the pictures are on the canvas: cameras with an aspect of their own leave borders.
+    /// Returns the place of the pictures on the canvas. Cameras with an aspect of their own leave borders.
     fn place(&self, drawn: &Drawn) -> [f32; 4] {
         let (width, height) = (self.configuration.width, self.configuration.height);
         let camera = &drawn.view.camera;
@@ -212,7 +212,7 @@ impl Screen {
         place
     }
 
-    /// What is shown, in memory.
+    /// Returns the picture shown, in memory.
     pub(super) async fn picture(&mut self, drawn: &Drawn) -> Result<Rgb8Image> {
         let gpu = &self.gpu;
         let composer =
@@ -224,12 +224,12 @@ impl Screen {
         &self.gpu.summary().name
     }
 
-    /// Bytes of the scenes and of what they are drawn with.
+    /// Returns the number of bytes of the scenes and of the buffers for drawing.
     pub(super) fn resident_bytes(&self) -> u64 {
         self.gpu.bytes()
     }
 
-    /// The most that they ever were.
+    /// Returns the largest value that this number has had.
     pub(super) fn most_bytes(&self) -> u64 {
         self.gpu.most_bytes()
     }
@@ -247,7 +247,7 @@ fn composition(drawn: &Drawn) -> Composition {
     Composition { arrangement: drawn.view.arrangement, pictures: drawn.pictures.clone() }
 }
 
-/// `camera` with both sides of its picture multiplied by `scale`.
+/// Returns `camera` with both sides of its picture multiplied by `scale`.
 fn scaled(camera: &Camera, scale: f64) -> Camera {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the width")]
     let width = (f64::from(camera.width) * scale).round() as u32;

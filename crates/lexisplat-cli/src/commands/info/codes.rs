@@ -1,4 +1,4 @@
-//! What `info` says about a .lexi file beyond what it says about any scene.
+//! The output of `info` for a .lexi file, in addition to the output for any scene.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ use super::bars;
 use super::layers::LayersFacts;
 use crate::commands::compress::{error_line, record_line, removed_line};
 
-/// Bytes of a Gaussian's SH in a dense scene of degree 3, DC included, in f32.
+/// Number of bytes of a Gaussian's SH in a dense scene of degree 3, DC included, in f32.
 const DENSE_SH_BYTES: usize = 192;
 /// Name of the processor as a device.
 const CPU: &str = "cpu";
@@ -38,7 +38,7 @@ pub(super) struct LexiFacts<'a> {
     resident_sh_bytes: u64,
     resident_sh_bytes_per_gaussian: f64,
     checksums: &'static str,
-    /// Whether the checksums of integers match, if they were verified.
+    /// Whether the checksums of decoded integers match, if they were verified.
     integer_checksums: Option<&'static str>,
     sh_bytes: ByteCount,
     attribute_bytes: BTreeMap<&'a str, ByteCount>,
@@ -48,7 +48,7 @@ pub(super) struct LexiFacts<'a> {
     gaussians: usize,
     #[serde(skip)]
     record: &'a Record,
-    /// Bytes by part, in the order of the file.
+    /// Number of bytes by part, in the order of the file.
     #[serde(skip)]
     parts: &'a [(String, f64)],
 }
@@ -68,13 +68,13 @@ struct PackedFacts<'a> {
     streams: &'a [StreamBits],
 }
 
-/// Bytes of each part of the file by name.
+/// Returns the number of bytes of each part of the file, by name.
 pub(super) fn parts(lexi: &LexiReader<'_>, survey: &Survey) -> Vec<(String, f64)> {
     part_bytes(lexi.attribute_bytes(), &survey.stream_bits)
 }
 
 impl<'a> LexiFacts<'a> {
-    /// The facts about the file that `lexi` read. `verified` tells whether the checksums of integers were verified.
+    /// Returns the facts about the file of `lexi`. `verified` tells whether the checksums of integers were verified.
     pub(super) fn new(
         lexi: &'a LexiReader<'_>,
         survey: &'a Survey,
@@ -121,7 +121,7 @@ impl<'a> LexiFacts<'a> {
         value / self.gaussians.max(1) as f64
     }
 
-    /// The line for people that says what kind of file this is.
+    /// Writes the line for people about the kind of the file.
     pub(super) fn head(&self, out: &mut String) -> Result<()> {
         let Self { version, layout, made, atoms, packed, .. } = self;
         let how = match (packed, made.pursuit) {
@@ -137,7 +137,7 @@ impl<'a> LexiFacts<'a> {
         Ok(())
     }
 
-    /// What the file records of its quality, and how many Gaussians were left out for it.
+    /// Returns the quality that the file records, and the number of Gaussians that were left out for it, as text.
     pub(super) fn quality(&self) -> Option<String> {
         let packed = self.packed.as_ref();
         let left_out = packed.filter(|packed| packed.removed > 0).map(|packed| removed_line(packed.removed));
@@ -152,7 +152,7 @@ impl<'a> LexiFacts<'a> {
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
-    /// Everything else.
+    /// Writes all other facts.
     pub(super) fn details(&self, out: &mut String) -> Result<()> {
         let Self { atoms, packed, escapes, .. } = self;
         if let Some(packed) = packed.as_ref().filter(|packed| packed.device != CPU) {
@@ -182,7 +182,7 @@ impl<'a> LexiFacts<'a> {
         Ok(())
     }
 
-    /// A line for each part of the file. Those of a packed file list their streams.
+    /// Writes a line for each part of the file. Parts of a packed file list their streams.
     fn parts_text(&self, out: &mut String) -> Result<()> {
         writeln!(out, "\n{:<18} {:>10} {:>16}   streams", "part", "bytes", "bits a Gaussian")?;
         for (name, bytes) in self.parts {

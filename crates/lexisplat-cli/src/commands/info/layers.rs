@@ -1,4 +1,4 @@
-//! What `info` says about the layers of a packed file.
+//! The output of `info` for the layers of a packed file.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ pub(super) struct LayersFacts {
     first_layer: FirstLayer,
 }
 
-/// A layer.
+/// The facts about one layer.
 #[derive(Serialize)]
 struct LayerFacts {
     gaussians: u64,
@@ -22,17 +22,17 @@ struct LayerFacts {
     bytes: LayerBytes,
 }
 
-/// Bytes of a layer by what they hold.
+/// Numbers of bytes of a layer, by contents.
 #[derive(Default, Serialize)]
 struct LayerBytes {
     base: u64,
     refinements: u64,
-    /// Of each part.
+    /// Number of bytes of each part of SH.
     sh_parts: Vec<u64>,
     interim: u64,
 }
 
-/// The first bytes of the file, which hold everything but SH of the first layer, some of it coarse.
+/// The first bytes of the file. They hold all of the first layer but SH; some of it is coarse.
 #[derive(Serialize)]
 struct FirstLayer {
     bytes: u64,
@@ -66,7 +66,7 @@ impl LayersFacts {
         Self { layers, first_layer }
     }
 
-    /// A line for each layer, and one for what the first needs.
+    /// Writes a line for each layer, and a line for the bytes that the first layer needs.
     pub(super) fn text(&self, out: &mut String) -> Result<()> {
         let parts = self.layers.iter().map(|layer| layer.bytes.sh_parts.len()).max().unwrap_or(0);
         write!(out, "\n{:<6} {:>12} {:>8} {:>11} {:>11}", "layer", "Gaussians", "chunks", "base", "finer")?;

@@ -87,7 +87,8 @@ enum Kind<'a> {
 }
 
 impl<'a> Facts<'a> {
-    /// The facts about the file `name` of `file_bytes` bytes. `like` is a scene like it without Gaussians.
+    /// Returns the facts about the file `name` of `file_bytes` bytes. `like` is a scene without Gaussians that otherwise
+    /// equals it.
     fn new(
         (file, file_bytes): (&'a str, u64),
         like: &'a Splats,
@@ -116,7 +117,7 @@ impl<'a> Facts<'a> {
         tell(common, self, || self.text(all))
     }
 
-    /// Three lines for people, and the details if `all` are asked for.
+    /// Returns three lines for people, and the details if `all` is set.
     fn text(&self, all: bool) -> Result<String> {
         let mut out = String::new();
         let (bytes, count) = (format::bytes(self.file_bytes), format::count(self.gaussians));
@@ -161,7 +162,7 @@ impl<'a> Facts<'a> {
         Ok(out)
     }
 
-    /// Where the centres of Gaussians are.
+    /// Returns the extent of the centres of Gaussians, as text.
     fn extent(&self) -> String {
         let axis = |name: &str| self.statistics.attributes.iter().find(|a| a.name == name);
         match ["x", "y", "z"].map(axis) {
@@ -174,7 +175,7 @@ impl<'a> Facts<'a> {
         }
     }
 
-    /// Everything else.
+    /// Writes all other facts.
     fn details(&self, lexi: Option<&LexiFacts<'_>>, out: &mut String) -> Result<()> {
         writeln!(out)?;
         if self.antialiased {
@@ -207,7 +208,7 @@ impl<'a> Facts<'a> {
     }
 }
 
-/// Writes a bar for each label, as long as its count is beside the largest.
+/// Writes a bar for each label. Its length is in proportion to its count.
 fn bars(out: &mut String, labels: &[String], counts: &[u64]) -> Result<()> {
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     for (label, &count) in labels.iter().zip(counts) {

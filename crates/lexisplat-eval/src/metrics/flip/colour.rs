@@ -1,14 +1,14 @@
-//! Colour spaces of FLIP. All constants are those of NVIDIA's `FLIP.h` (v1.7), which gives their sources.
+//! Colour spaces of FLIP. All constants are those of NVIDIA's `FLIP.h` (v1.7), which states their sources.
 
 use std::sync::LazyLock;
 
-/// Largest sRGB value on the straight part of the curve (IEC 61966-2-1).
+/// Largest sRGB value on the straight part of the transfer curve (IEC 61966-2-1).
 const SRGB_KNEE: f64 = 0.04045;
-/// Slope of the straight part.
+/// Slope of the straight part of the curve.
 const SRGB_SLOPE: f64 = 12.92;
-/// Offset of the curved part.
+/// Offset of the curved part of the curve.
 const SRGB_OFFSET: f64 = 0.055;
-/// Exponent of the curved part.
+/// Exponent of the curved part of the curve.
 const SRGB_GAMMA: f64 = 2.4;
 
 /// Linear sRGB to CIE XYZ (`LinearRGB2XYZ`).
@@ -28,14 +28,15 @@ const WHITE: [f64; 3] = [0.950_428_545, 1.0, 1.088_900_371];
 /// Reciprocal of the white point, rounded as in the source (`INV_DEFAULT_ILLUMINANT`).
 const INVERSE_WHITE: [f64; 3] = [1.052_156_925, 1.0, 0.918_357_670];
 
-/// CIE L*a*b*: `L = 116 y - 16`, `a = 500 (x - y)`, `b = 200 (y - z)`. YCxCz is the same without the curve.
+/// Constants of CIE L*a*b*: `L = 116 y - 16`, `a = 500 (x - y)`, `b = 200 (y - z)`. YCxCz has the same formulas with
+/// linear x, y and z.
 pub(super) const LIGHTNESS_SCALE: f64 = 116.0;
 const LIGHTNESS_OFFSET: f64 = 16.0;
 const RED_GREEN_SCALE: f64 = 500.0;
 const BLUE_YELLOW_SCALE: f64 = 200.0;
-/// Largest value for which L*a*b* has a line instead of the cube root.
+/// Cube root of the largest value for which L*a*b* has a line instead of the cube root.
 const LAB_DELTA: f64 = 6.0 / 29.0;
-/// Value of that line at 0.
+/// Value of this line at 0.
 const LAB_TERM: f64 = 4.0 / 29.0;
 
 /// Strength of the Hunt effect: chroma is seen in proportion to lightness (`Hunt`).
@@ -63,11 +64,11 @@ fn opponent([x, y, z]: [f64; 3]) -> [f64; 3] {
     [LIGHTNESS_SCALE * y - LIGHTNESS_OFFSET, RED_GREEN_SCALE * (x - y), BLUE_YELLOW_SCALE * (y - z)]
 }
 
-/// [`linear`] of each 8-bit value.
+/// The value of [`linear`] for each 8-bit value.
 static LINEAR: LazyLock<[f64; 256]> =
     LazyLock::new(|| std::array::from_fn(|k| linear(f64::from(of_8bit(k)))));
 
-/// The value of an 8-bit channel, as pictures are read.
+/// Returns the value of an 8-bit channel, as in pictures that are read.
 #[expect(clippy::cast_precision_loss, reason = "at most 255")]
 fn of_8bit(k: usize) -> f32 {
     k as f32 / 255.0
@@ -79,16 +80,17 @@ pub(super) fn srgb_to_ycxcz(srgb: [f32; 3]) -> [f64; 3] {
     opponent(white_balanced(srgb.map(|value| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255")]
         let k = (value * 255.0).round().clamp(0.0, 255.0) as usize;
-        // Photos have nothing but 8-bit values, and the curve is slow.
+        // Photos have only 8-bit values, and computing the curve is slow.
         if of_8bit(k) == value { table[k] } else { linear(f64::from(value)) }
     })))
 }
 
 /// Returns the cube root of a positive `x`, with a relative error of at most 1e-15.
 ///
-/// The exponent divided by 3 is within 6 % of it. Each of Halley's steps cubes the error.
+/// The first estimate divides the exponent by 3. It is within 6 % of the root. Each of Halley's steps cubes the error.
 fn cube_root(x: f64) -> f64 {
-    /// A third of the exponent's bias, in the bits of an f64, and so little less that the error is even to both sides.
+    /// A third of the exponent's bias, in the bits of an `f64`. It is lowered a little, so that the error is equal to
+    /// both sides.
     const THIRD_OF_BIAS: u64 = 0x2a9f_7893_782d_a1ce;
     let mut y = f64::from_bits(x.to_bits() / 3 + THIRD_OF_BIAS);
     for _ in 0..3 {
@@ -118,8 +120,8 @@ pub(super) fn rgb_to_hunt_lab(rgb: [f64; 3]) -> [f64; 3] {
     [lightness, HUNT * lightness * a, HUNT * lightness * b]
 }
 
-/// Returns the distance of two colours that may differ much: city block in lightness, Euclidean in chroma (Abasi et
-/// al. 2020).
+/// Returns the distance of two colours that may differ much: the city-block distance in lightness plus the Euclidean
+/// distance in chroma (Abasi et al. 2020).
 pub(super) fn hyab(p: [f64; 3], q: [f64; 3]) -> f64 {
     let (a, b) = (p[1] - q[1], p[2] - q[2]);
     (p[0] - q[0]).abs() + (a * a + b * b).sqrt()

@@ -1,5 +1,5 @@
-//! Filters of FLIP: the blur of the eye at the viewing distance, and detectors of edges and points as wide as the
-//! eye sees them.
+//! Filters of FLIP: the blur of the eye at the viewing distance, and detectors of edges and points at the width that the
+//! eye sees.
 
 use std::f64::consts::PI;
 
@@ -10,28 +10,28 @@ const SCREEN_METRES: f64 = 0.7;
 /// Width of the screen in pixels.
 const SCREEN_PIXELS: f64 = 3840.0;
 
-/// Contrast sensitivity as sums of Gaussians in space, `a sqrt(pi / b) exp(-pi^2 x^2 / b)` with x in degrees
-/// (FLIP paper, table 1, which has them from Johnson and Fairchild 2001): `(a, b)` of Y.
+/// Contrast sensitivity as sums of Gaussians in space, `a sqrt(pi / b) exp(-pi^2 x^2 / b)` with x in degrees (FLIP paper,
+/// table 1, after Johnson and Fairchild 2001): `(a, b)` of Y.
 const ACHROMATIC: (f64, f64) = (1.0, 0.0047);
-/// `(a, b)` of Cx. Its second Gaussian has weight 0.
+/// `(a, b)` of Cx. The second Gaussian of Cx has weight 0.
 const RED_GREEN: (f64, f64) = (1.0, 0.0053);
 /// `(a, b)` of both Gaussians of Cz.
 const BLUE_YELLOW: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
-/// Largest `b`. It sets the radius of all filters.
+/// Largest `b` of all channels. It determines the radius of all filters.
 const WIDEST: f64 = 0.04;
-/// Filters end after this many standard deviations.
+/// Radius of the filters, in standard deviations.
 const DEVIATIONS: f64 = 3.0;
 
-/// Width of edges and points as seen, in degrees (`gw`, from Thorpe et al.; FLIP paper section 4.2).
+/// Perceived width of edges and points, in degrees (`gw`, from Thorpe et al.; FLIP paper section 4.2).
 const FEATURE_WIDTH: f64 = 0.082;
 
-/// Pixels in one degree of the field of view: 67.02.
+/// Returns the number of pixels in one degree of the field of view: 67.02.
 pub(super) fn pixels_per_degree() -> f64 {
     DISTANCE * (SCREEN_PIXELS / SCREEN_METRES) * (PI / 180.0)
 }
 
-/// Weights along one axis of the blur of each channel. All have the same odd length. Y and Cx are the product
-/// of their weights down and across. Cz is the sum of two such products.
+/// Weights of the blur of each channel along one axis. All have the same odd length. The 2-D weights of Y and Cx are
+/// products of the weights down and across. Those of Cz are the sum of two such products.
 pub(super) struct Blur {
     pub(super) y: Vec<f64>,
     pub(super) cx: Vec<f64>,
@@ -49,8 +49,8 @@ impl Blur {
             scale_to(&mut weights, 1.0);
             weights
         };
-        // The 2-D weights are `a sqrt(pi / b)` times a Gaussian, so each axis gets the root of that factor;
-        // then all are scaled for the 2-D weights of both to sum to 1.
+        // The 2-D weights are `a sqrt(pi / b)` times a Gaussian, so the weights of each axis get the root of this factor.
+        // Then all weights are scaled so that the 2-D weights of both Gaussians sum to 1.
         let mut cz = BLUE_YELLOW.map(|(a, b)| {
             let factor = (a * (PI / b).sqrt()).sqrt();
             gaussian(b).into_iter().map(|weight| factor * weight).collect::<Vec<f64>>()
@@ -61,13 +61,13 @@ impl Blur {
     }
 }
 
-/// Weights along one axis of the feature detectors. All have the same odd length.
+/// Weights of the feature detectors along one axis. All have the same odd length.
 pub(super) struct Features {
     /// A Gaussian that sums to 1.
     pub(super) smooth: Vec<f64>,
-    /// Its first derivative: positive weights sum to 1 and negative ones to -1.
+    /// First derivative of the Gaussian. Positive weights sum to 1, and negative weights to -1.
     pub(super) edge: Vec<f64>,
-    /// Its second derivative, scaled alike.
+    /// Second derivative of the Gaussian. Positive weights sum to 1, and negative weights to -1.
     pub(super) point: Vec<f64>,
 }
 
@@ -97,7 +97,7 @@ fn scale_to(weights: &mut [f64], sum: f64) {
     weights.iter_mut().for_each(|weight| *weight *= factor);
 }
 
-/// Scales positive weights to sum to 1 and negative ones to -1.
+/// Scales positive weights to sum to 1, and negative weights to sum to -1.
 fn balance(weights: &mut [f64]) {
     let positive: f64 = weights.iter().filter(|&&w| w > 0.0).sum();
     let negative: f64 = -weights.iter().filter(|&&w| w < 0.0).sum::<f64>();

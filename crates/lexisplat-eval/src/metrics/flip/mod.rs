@@ -1,5 +1,5 @@
-//! FLIP for pictures of low dynamic range: Andersson et al., "FLIP: A Difference Evaluator for Alternating
-//! Images", 2020, as NVIDIA's `FLIP.h` (v1.7) computes it.
+//! FLIP for pictures of low dynamic range: Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", 2020,
+//! as computed by NVIDIA's `FLIP.h` (v1.7).
 
 mod colour;
 mod filters;
@@ -19,12 +19,12 @@ use lexisplat_compress::Result;
 const COLOUR_EXPONENT: f64 = 0.7;
 /// Share of the largest colour difference up to which differences are resolved finely (`gpc`).
 const COLOUR_KNEE: f64 = 0.4;
-/// Value that this share maps to (`gpt`).
+/// Value to which this share is mapped (`gpt`).
 const COLOUR_KNEE_TO: f64 = 0.95;
 
-/// Returns the mean FLIP over all pixels of `test` and `reference`, both sRGB: 0 for identical pictures, at most 1.
-/// Symmetric. The pictures are seen from 0.7 m on a screen of 0.7 m and 3840 pixels (67 pixels per degree), which is
-/// FLIP's default.
+/// Returns the mean FLIP over all pixels of `test` and `reference`, which are in sRGB. It is 0 for identical pictures and
+/// at most 1. It is symmetric. The viewing distance is 0.7 m, and the screen has a width of 0.7 m and 3840 pixels (67
+/// pixels per degree), which is FLIP's default.
 ///
 /// # Errors
 /// [`lexisplat_compress::Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
@@ -54,7 +54,7 @@ pub fn flip(reference: &Image, test: &Image) -> Result<f64> {
 struct Filters {
     blur: Blur,
     features: Features,
-    /// Largest compressed colour difference: between green and blue.
+    /// Largest compressed colour difference: that of green and blue.
     largest: f64,
 }
 
@@ -68,9 +68,9 @@ static FILTERS: LazyLock<Filters> = LazyLock::new(|| {
     }
 });
 
-/// A pixel as the eye sees it.
+/// A pixel as perceived by the eye.
 struct Seen {
-    /// L*a*b* with the Hunt effect.
+    /// Colour in L*a*b* with the Hunt effect.
     lab: [f64; 3],
     /// Strength of an edge at the pixel.
     edge: f64,
@@ -88,15 +88,15 @@ fn pixel(a: Seen, b: Seen, largest: f64) -> f64 {
         COLOUR_KNEE_TO + (difference - knee) / (largest - knee) * (1.0 - COLOUR_KNEE_TO)
     };
     let feature = (a.edge - b.edge).abs().max((a.point - b.point).abs()) / std::f64::consts::SQRT_2;
-    // The root is the exponent `gqf` of 0.5.
+    // The square root is the exponent `gqf` of 0.5.
     colour.powf(1.0 - feature.sqrt())
 }
 
-/// Filtered rows of one picture. Its border is repeated outside of it.
+/// Filtered rows of one picture. The border of the picture is repeated outside of it.
 struct Row {
-    /// Filtered down the columns, the border repeated to each side: Y, Cx, Cz twice.
+    /// Y, Cx and twice Cz, blurred down the columns. The border is repeated to each side.
     blurred: [Vec<f64>; 4],
-    /// The same for smooth, edge and point weights.
+    /// Y filtered down the columns by the smooth, edge and point weights.
     derived: [Vec<f64>; 3],
     /// Blurred YCxCz.
     colour: [Vec<f64>; 3],
@@ -148,7 +148,7 @@ impl Row {
     fn at(&self, x: usize) -> Seen {
         let colour = self.colour.each_ref().map(|row| row[x]);
         let [edge_across, edge_down, point_across, point_down] = self.slopes.each_ref().map(|row| row[x]);
-        // Features are of Y scaled to 0..1. Its offset falls away, for these weights sum to 0.
+        // Features are of Y scaled to 0..1. The offset of Y has no effect, because the weights sum to 0.
         Seen {
             lab: rgb_to_hunt_lab(ycxcz_to_rgb(colour)),
             edge: (edge_across * edge_across + edge_down * edge_down).sqrt() / LIGHTNESS_SCALE,
@@ -157,7 +157,8 @@ impl Row {
     }
 }
 
-/// Filters `plane` down its columns at row `y` into the middle of `out`, and repeats the ends to each side.
+/// Filters `plane` down its columns at row `y`. Writes the result into the middle of `out`, and repeats its ends to each
+/// side.
 #[inline(always)]
 fn down(out: &mut [f64], weights: &[f64], plane: &[f64], y: usize, height: usize) {
     let width = plane.len() / height;

@@ -3,15 +3,16 @@
 use super::gemm::{Sizes, Store, multiply};
 use super::map::{Map, windows};
 
-/// Output pixels of one product, about. Fewer do not pay for packing the weights. More leave threads without work.
+/// Approximate number of output pixels of one product. With fewer, packing the weights takes too long. With more, threads
+/// have no work.
 const BLOCK_PIXELS: usize = 512;
-/// Number of blocks that a map is cut into at least, so that small maps use all cores.
+/// Smallest number of blocks into which a map is cut, so that small maps use all cores.
 const MIN_BLOCKS: usize = 8;
 
 /// Shape of a convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ConvShape {
-    /// Number in torchvision's `features`, which is in the names of its tensors.
+    /// Number of the layer in torchvision's `features`, which is part of the names of its tensors.
     pub(super) index: usize,
     /// Number of features of an input pixel.
     pub(super) inputs: usize,
@@ -19,7 +20,7 @@ pub(super) struct ConvShape {
     pub(super) outputs: usize,
     /// Side of the window in pixels.
     pub(super) side: usize,
-    /// Pixels from one window to the next.
+    /// Distance of neighbouring windows, in pixels.
     pub(super) stride: usize,
     /// Width of the border of zeros around the map, in pixels.
     pub(super) padding: usize,
@@ -36,14 +37,14 @@ impl ConvShape {
 #[derive(Debug)]
 pub(super) struct Conv {
     pub(super) shape: ConvShape,
-    /// Weights by row of the window, pixel of the row, input and output.
+    /// Weights, ordered by row of the window, pixel of the row, input and output.
     weights: Vec<f32>,
     bias: Vec<f32>,
 }
 
 impl Conv {
-    /// Returns the convolution with weights in PyTorch's order: output, input, row, column. Weights and biases have
-    /// the lengths that `shape` says.
+    /// Returns the convolution with weights in PyTorch's order: output, input, row, column. Weights and biases must have
+    /// the lengths of `shape`.
     pub(super) fn new(shape: ConvShape, weights: &[f32], bias: Vec<f32>) -> Self {
         let ConvShape { inputs, outputs, side, .. } = shape;
         let window = side * side;
@@ -58,17 +59,17 @@ impl Conv {
     }
 
     /// Returns the output of the layer with a border of `padding` zeros, or `None` if no window fits. The border of
-    /// `input` is as wide as the padding of this layer.
+    /// `input` must be as wide as the padding of this layer.
     ///
-    /// The pixels of a window's row lie together in memory. So each row of the window is one matrix product, whose
-    /// input rows overlap, and the products are added. One product covers several output rows with their borders.
+    /// The pixels of a window's row lie together in memory. Each row of the window is therefore one matrix product with
+    /// overlapping input rows, and the products are added. One product covers several output rows with their borders.
     pub(super) fn apply(&self, input: &Map, padding: usize) -> Option<Map> {
         let ConvShape { inputs, outputs, side, stride, .. } = self.shape;
         let padded = input.width + 2 * input.padding;
         let (width, height) =
             (windows(padded, side, stride)?, windows(input.height + 2 * input.padding, side, stride)?);
         let mut out = Map::zeros(width, height, outputs, padding);
-        // With a stride, rows of output pixels are not evenly spaced from one row to the next.
+        // With a stride above 1 the output pixels of consecutive rows are not evenly spaced.
         let rows =
             if stride == 1 { (BLOCK_PIXELS / padded).clamp(1, height.div_ceil(MIN_BLOCKS)) } else { 1 };
         let row_entries = out.row_entries();

@@ -1,7 +1,7 @@
-//! Products of matrices in `f32`. Only this file gives pointers to `matrixmultiply`.
+//! Matrix products in `f32`. Only this file passes pointers to `matrixmultiply`.
 #![expect(unsafe_code, reason = "matrixmultiply::sgemm takes pointers; bounds are asserted before the call")]
 
-/// Sizes of a product: a matrix of `rows` x `depth` times one of `depth` x `columns`.
+/// Sizes of a product: a `rows` x `depth` matrix times a `depth` x `columns` matrix.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
     pub(super) rows: usize,
@@ -9,15 +9,15 @@ pub(super) struct Sizes {
     pub(super) columns: usize,
 }
 
-/// Whether a product replaces the output or is added to it.
+/// Whether a product replaces the output or is added to the output.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Store {
     Replace,
     Add,
 }
 
-/// Writes the product of `a` and `b` to `out`. Rows of `a` begin `step` entries apart and may overlap. `b` and `out`
-/// are dense, row by row. The order of each sum depends only on `sizes`.
+/// Writes the product of `a` and `b` to `out`, or adds it. Rows of `a` begin `step` entries apart and may overlap. `b`
+/// and `out` are dense, row by row. The order of each sum depends only on `sizes`.
 ///
 /// # Panics
 /// If a slice is too short for `sizes`.
@@ -32,7 +32,7 @@ pub(super) fn multiply(sizes: Sizes, a: &[f32], step: usize, b: &[f32], out: &mu
     assert!(entries(depth).is_some_and(|end| end <= b.len()), "the right matrix holds {} entries", b.len());
     assert!(entries(rows).is_some_and(|end| end <= out.len()), "the result holds {} entries", out.len());
     let beta = if store == Store::Add { 1.0 } else { 0.0 };
-    // With one row `step` is never used, and need not fit.
+    // With a single row `step` is not used, and need not fit in an `isize`.
     let step = if rows == 1 { depth } else { step };
     let (step, across) = (step.cast_signed(), columns.cast_signed());
     // SAFETY: `a` is read at `i * step + p`, `b` at `p * columns + j` and `out` read and written at

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-/// Features of all pixels, with a border of zeros for the layer that reads them.
+/// Features of all pixels, with a border of zeros for the next layer.
 #[derive(Debug, Clone)]
 pub(super) struct Map {
-    /// Pixels in a row, without borders.
+    /// Number of pixels in a row, without borders.
     pub(super) width: usize,
     /// Number of rows, without borders.
     pub(super) height: usize,
@@ -13,7 +13,7 @@ pub(super) struct Map {
     pub(super) channels: usize,
     /// Width of the border, in pixels.
     pub(super) padding: usize,
-    /// Rows from the top, with borders. The features of a pixel lie together.
+    /// Values of the rows from the top, with borders. The features of a pixel lie together.
     pub(super) values: Vec<f32>,
 }
 
@@ -35,7 +35,7 @@ impl Map {
         &self.values[start..start + self.width * self.channels]
     }
 
-    /// Calls `f` on blocks of `rows` rows in parallel. `f` is given scratch memory of its thread, the index of the
+    /// Calls `f` on blocks of `rows` rows in parallel. `f` receives the scratch memory of its thread, the index of the
     /// first row, and the rows with their borders.
     pub(super) fn fill_blocks<S>(
         &mut self,
@@ -51,8 +51,8 @@ impl Map {
             .for_each_init(scratch, |scratch, (block, values)| f(scratch, block * rows, values));
     }
 
-    /// Returns the largest value of every window of `side` x `side` within the map, `stride` apart
-    /// (`torch.nn.MaxPool2d`), or `None` if no window fits.
+    /// Returns the largest value of every window of `side` x `side` pixels within the map; windows are `stride` pixels
+    /// apart (`torch.nn.MaxPool2d`). Returns `None` if no window fits.
     pub(super) fn max_pool(&self, side: usize, stride: usize, padding: usize) -> Option<Self> {
         let (width, height) = (windows(self.width, side, stride)?, windows(self.height, side, stride)?);
         let channels = self.channels;

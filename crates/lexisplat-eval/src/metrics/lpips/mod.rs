@@ -1,5 +1,5 @@
-//! LPIPS, version 0.1: Zhang et al., "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric",
-//! 2018, as the `lpips` package 0.1.4 computes it. This crate has no weights. [`Lpips::load`] reads them.
+//! LPIPS, version 0.1: Zhang et al., "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric", 2018, as
+//! computed by the `lpips` package 0.1.4. This crate has no weights; [`Lpips::load`] reads them.
 
 mod conv;
 mod gemm;
@@ -23,17 +23,17 @@ use lexisplat_compress::{Error, Result};
 const EPSILON: f64 = 1e-10;
 /// Value subtracted from each colour (`lpips.ScalingLayer`), for pictures in -1..1.
 const SHIFT: [f32; COLOURS] = [-0.030, -0.088, -0.188];
-/// Divisor of each colour after that (`lpips.ScalingLayer`).
+/// Divisor of each colour after the subtraction (`lpips.ScalingLayer`).
 const SCALE: [f32; COLOURS] = [0.458, 0.448, 0.450];
 /// Number of partial sums over features.
 const LANES: usize = 8;
 
-/// Range of the pixel values that the network is given.
+/// Range of the pixel values that are the input of the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
-    /// -1..1, which the constants are for. The `lpips` package uses it.
+    /// -1..1, the range for which the constants are made. The `lpips` package uses it.
     Standard,
-    /// 0..1. `metrics.py` of the 3DGS repository uses it, so tables of 3DGS papers print it (its issue 1239).
+    /// 0..1. `metrics.py` of the 3DGS repository uses this range, so tables of 3DGS papers have it (its issue 1239).
     Inria,
 }
 
@@ -43,18 +43,18 @@ pub struct Lpips {
     stages: Vec<Layers>,
 }
 
-/// A stage of the network. Its output is compared.
+/// A stage of the network. Outputs of stages are compared.
 struct Layers {
     pool: Option<Pool>,
     convs: Vec<Conv>,
     /// Weight of each feature.
     linear: Vec<f32>,
-    /// Border of the output that the next layer needs, in pixels.
+    /// Border of the output for the next layer, in pixels.
     padding_after: usize,
 }
 
 impl Lpips {
-    /// Returns the network with the weights that `get` returns by name and shape.
+    /// Returns the network with the weights that `get` returns for a name and a shape.
     fn build(network: Network, mut get: impl FnMut(&str, &[usize]) -> Result<Vec<f32>>) -> Result<Self> {
         let shapes = network.stages();
         let mut stages = Vec::with_capacity(STAGES);
@@ -83,11 +83,12 @@ impl Lpips {
         self.network
     }
 
-    /// Returns the LPIPS of two pictures: 0 if all features are equal. Symmetric. It is computed in `f32` and right to
-    /// about five digits. At most three maps of the widest stage are in memory: 1.3 GB for VGG16 at 1600 x 1066.
+    /// Returns the LPIPS of two pictures. It is 0 if all features are equal, and symmetric. It is computed in `f32`, and
+    /// about five digits are right. At most three maps of the widest stage are in memory: 1.3 GB for VGG16 at 1600 x
+    /// 1066.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the sizes differ, a picture has NaN or is smaller than [`Network::min_size`], or the
+    /// [`Error::Parameter`] if the sizes differ, if a picture has NaN or is smaller than [`Network::min_size`], or if the
     /// weights make the features overflow.
     pub fn distance(&self, a: &Image, b: &Image, range: Range) -> Result<f64> {
         comparable(a, b)?;
@@ -100,7 +101,7 @@ impl Lpips {
         self.finite(total)
     }
 
-    /// Returns the picture as the first layer reads it.
+    /// Returns the picture in the form in which the first layer reads it.
     fn input(&self, image: &Image, range: Range) -> Result<Map> {
         if image.width.min(image.height) < self.network.min_size() {
             return Err(self.too_small(image.width, image.height));
@@ -162,8 +163,8 @@ impl fmt::Debug for Lpips {
     }
 }
 
-/// Returns the mean over pixels of the weighted squared difference of features. The features of each pixel are scaled
-/// to length 1 first.
+/// Returns the mean over pixels of the weighted squared difference of features. The features of each pixel are first
+/// scaled to length 1.
 fn difference(a: &Map, b: &Map, weights: &[f32]) -> f64 {
     let channels = weights.len();
     let row = |y| -> f64 {

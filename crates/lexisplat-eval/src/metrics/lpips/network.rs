@@ -20,7 +20,7 @@ pub(super) struct Pool {
     pub(super) stride: usize,
 }
 
-/// Layers of a network whose last output is compared.
+/// Layers of a network. The output of the last layer is compared.
 #[derive(Debug)]
 pub(super) struct Stage {
     pub(super) pool: Option<Pool>,
@@ -60,7 +60,8 @@ impl Network {
         match self {
             // Halved by four pools.
             Self::Vgg => 16,
-            // 31 + 4 in windows of 11, 4 apart, is 7; pools of 3, 2 apart, make it 3 and 1.
+            // The first convolution has windows of 11, 4 apart: (31 + 4 - 11) / 4 + 1 is 7. Pools of 3, 2 apart, reduce 7
+            // to 3 and 3 to 1.
             Self::Alex => 31,
         }
     }

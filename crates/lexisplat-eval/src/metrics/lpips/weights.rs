@@ -1,8 +1,8 @@
 //! Weights of a network and of LPIPS, read from safetensors.
 //!
-//! Tensors have the names of the published files: `features.N.weight` and `.bias` as in torchvision,
-//! `linN.model.1.weight` as in the `lpips` package. The metadata key `network` is `vgg` or `alex`. Without it
-//! the shape of the first layer tells. Other tensors are ignored. `scripts/lpips_weights.py` writes such files.
+//! Tensors have the names of the published files: `features.N.weight` and `.bias` as in torchvision, and
+//! `linN.model.1.weight` as in the `lpips` package. The metadata key `network` is `vgg` or `alex`. Without this key the
+//! shape of the first layer tells the network. Other tensors are ignored. `scripts/lpips_weights.py` writes such files.
 
 use std::fs::File;
 use std::io::Read;
@@ -18,17 +18,18 @@ use lexisplat_compress::{Error, Result};
 const MAX_BYTES: u64 = 1 << 30;
 /// Metadata key that names the network.
 const NETWORK_KEY: &str = "network";
-/// Tensor whose shape tells the networks apart.
+/// Tensor whose shape distinguishes the networks.
 const FIRST_TENSOR: &str = "features.0.weight";
 /// Advice for a file that cannot be used.
 const ADVICE: &str = "scripts/lpips_weights.py writes such files";
 
 impl Lpips {
-    /// Reads the weights of a network and of LPIPS from a safetensors file (see the module's notes on names).
+    /// Reads the weights of a network and of LPIPS from a safetensors file. The module's documentation lists the names of
+    /// tensors.
     ///
     /// # Errors
-    /// [`Error::Io`] if the file cannot be read. [`Error::Limit`] if it has more than 1 GiB. [`Error::Format`] if it
-    /// is not safetensors, or a tensor is missing, not F32, of the wrong shape, or holds NaN or infinity.
+    /// [`Error::Io`] if the file cannot be read. [`Error::Limit`] if it is larger than 1 GiB. [`Error::Format`] if it is
+    /// not safetensors, or if a tensor is missing, is not F32, has the wrong shape, or holds NaN or infinity.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let io = |e| Error::io(path, e);
@@ -41,7 +42,7 @@ impl Lpips {
         };
         let file = File::open(path).map_err(io)?;
         check(file.metadata().map_err(io)?.len())?;
-        // Not every file knows its size.
+        // Not every file knows its size, so the number of bytes read is checked too.
         let mut bytes = Vec::new();
         check(file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)? as u64)?;
         Self::from_bytes(&path.display().to_string(), &bytes)

@@ -1,8 +1,9 @@
-// Draws tiles as `cpu::blend` does. Each group draws one tile, and each lane one pixel, with the splats from
-// front to back.
+// Draws tiles like `cpu::blend`. Each workgroup draws one tile, and each lane one pixel. Splats are drawn from front to
+// back.
 @group(0) @binding(7) var<storage, read_write> pixels: array<vec4<f32>>;
 
-// A batch of splats: the centre with the conic's xx and xy; the conic's yy with the opacity; the colour.
+// A batch of splats. `batch_centre` has the centre and the conic's xx and xy, `batch_conic` the conic's yy and the
+// opacity, the third array the colour.
 var<workgroup> batch_centre: array<vec4<f32>, GROUP>;
 var<workgroup> batch_conic: array<vec2<f32>, GROUP>;
 var<workgroup> batch_colour: array<vec3<f32>, GROUP>;

@@ -1,4 +1,4 @@
-// Gives every marked Gaussian a slot. Slots are in order of the Gaussians.
+// Gives a slot to every marked Gaussian. Slots are in the order of the Gaussians.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> masks: array<u32>;
 @group(0) @binding(2) var<storage, read> starts: array<u32>;

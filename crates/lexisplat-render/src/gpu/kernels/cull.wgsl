@@ -1,15 +1,15 @@
-// Marks the Gaussians that may be visible. The test is a coarse one on bounding spheres; it marks every
-// Gaussian that is visible.
+// Marks the Gaussians that may be visible. The test is coarse and works on bounding spheres. It marks every Gaussian that
+// is visible, and some others.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
-// Position, and the largest standard deviation. That is -1 for Gaussians that are never drawn.
+// Position, and largest standard deviation. The latter is -1 for Gaussians that are never drawn.
 @group(0) @binding(2) var<storage, read> bodies: array<vec4<f32>>;
-// One bit for each Gaussian.
+// One bit for each Gaussian: whether it is marked.
 @group(0) @binding(3) var<storage, read_write> masks: array<u32>;
 // Number of Gaussians marked in each block.
 @group(0) @binding(4) var<storage, read_write> starts: array<u32>;
-// The rows of tiles in which Gaussians are looked for: all of the picture's, or some of them where the buffers
-// do not hold the Gaussians of all.
+// The rows of tiles in which Gaussians are searched for. They are all rows of the picture, or a band of them if the
+// buffers do not hold the Gaussians of all rows.
 @group(0) @binding(5) var<uniform> band: Band;
 
 var<workgroup> words: array<atomic<u32>, MASK_WORDS>;
@@ -23,13 +23,13 @@ fn may_be_seen(body: vec4<f32>) -> bool {
     let ratio = vec2<f32>(dot(frame.right, d), dot(frame.down, d)) / z;
     let limit = TAN_LIMIT * frame.tangents;
     let t = clamp(ratio, -limit, limit);
-    // A variance on screen is at most the largest variance times the squared length of the Jacobian's row. The
-    // larger eigenvalue is at most the sum of the variances.
+    // A variance on screen is at most the largest variance in the world times the squared length of the Jacobian's row.
+    // The larger eigenvalue is at most the sum of both variances.
     let scale = body.w * frame.focal / z;
     let variance = dot(scale * scale, vec2<f32>(1.0) + t * t) + 2.0 * DILATION + sqrt(EIGEN_FLOOR);
     let radius = RADIUS_SIGMAS * sqrt(variance) * (1.0 + CULL_SLACK) + 1.0;
     let centre = ((ratio / frame.tangents + 1.0) * frame.size - 1.0) * 0.5;
-    // The margin is two pixels more than a tile, since this rounds the centre differently than `project`.
+    // The margin is two pixels larger than a tile, because this kernel rounds the centre differently from `project`.
     let margin = radius + f32(TILE) + 2.0;
     let top = f32(band.first * TILE);
     let bottom = f32((band.first + band.rows) * TILE);

@@ -1,17 +1,17 @@
-// Values that are the same for a whole picture, laid out as `gpu::uniforms::FrameUniform`.
+// Values that are the same for a whole picture, with the layout of `gpu::uniforms::FrameUniform`.
 struct Frame {
-    // World directions of the camera: rows of the world-to-view rotation.
+    // Directions of the camera in the world: the rows of the world-to-view rotation.
     right: vec3<f32>,
     // SH degree to evaluate.
     degree: u32,
     down: vec3<f32>,
-    // Tiles in a row.
+    // Number of tiles in a row.
     columns: u32,
     forward: vec3<f32>,
-    // Rows of tiles.
+    // Number of rows of tiles.
     rows: u32,
     position: vec3<f32>,
-    // 1 for the anti-aliased rules.
+    // 1 if the rules for anti-aliasing apply, otherwise 0.
     antialiased: u32,
     background: vec3<f32>,
     // Number of slots for Gaussians that may be visible.
@@ -20,35 +20,35 @@ struct Frame {
     tangents: vec2<f32>,
     focal: vec2<f32>,
     size: vec2<f32>,
-    // Pixels in a row, and rows.
+    // Number of pixels in a row, and number of rows.
     width: u32,
     height: u32,
-    // Blocks of Gaussians in the scene.
+    // Number of blocks of Gaussians in the scene.
     blocks: u32,
     chunks: u32,
-    // Number of entries that the buffers of the tiles' lists hold.
+    // Number of entries that the buffers of the tile lists hold.
     entries: u32,
-    // View-space z beyond which something is drawn.
+    // Near plane: only Gaussians of larger view-space z are drawn.
     near: f32,
 }
 
-// A part of the scene that fits in one binding, laid out as `gpu::uniforms::ChunkUniform`.
+// A chunk of the scene, which fits in one binding, with the layout of `gpu::uniforms::ChunkUniform`.
 struct Chunk {
-    // Its first Gaussian, a multiple of GROUP, and the number of them.
+    // First Gaussian of the chunk, a multiple of GROUP, and number of Gaussians.
     first: u32,
     count: u32,
-    // Its first block of GROUP Gaussians, and the number of them.
+    // First block of GROUP Gaussians of the chunk, and number of blocks.
     first_block: u32,
     blocks: u32,
-    // Where in `columns` the numbers of its escaped Gaussians begin, and how many there are.
+    // Place in `columns` where the numbers of the escaped Gaussians begin, and number of escaped Gaussians.
     escapes_at: u32,
     escapes: u32,
-    // Where in `nonzeros` their exact rows begin.
+    // Place in `nonzeros` where the exact rows of the escaped Gaussians begin.
     exact_at: u32,
     padding: u32,
 }
 
-// Rows of tiles drawn at once, laid out as `gpu::uniforms::Band`.
+// Rows of tiles that are drawn together, with the layout of `gpu::uniforms::Band`.
 struct Band {
     first: u32,
     rows: u32,
@@ -56,7 +56,7 @@ struct Band {
     padding: u32,
 }
 
-// The number of the workgroup. A dispatch has two dimensions where one does not hold all groups.
+// Returns the number of the workgroup. A dispatch has two dimensions if one dimension does not hold all groups.
 fn group_number(group: vec3<u32>, groups: vec3<u32>) -> u32 {
     return group.x + group.y * groups.x;
 }

@@ -1,13 +1,13 @@
-// Adds up the moments of each splat over the tiles that it touches, as `cpu::moments::Moments::add` does. The
-// tiles are in the order of the lists, and the sums go on where those of the bands before stopped.
+// Adds up the moments of each splat over the tiles that it touches, like `cpu::moments::Moments::add`. The tiles are in
+// the order of the lists. The sums of the bands before are continued.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
-// The slots in order of depth.
+// Slots in the order of depth.
 @group(0) @binding(2) var<storage, read> order: array<u32>;
-// Where the entries of each splat begin.
+// Place where the entries of each splat begin.
 @group(0) @binding(3) var<storage, read> offsets: array<u32>;
 @group(0) @binding(4) var<storage, read> moments: array<f32>;
-// The moments of each slot.
+// Sums of moments of each slot.
 @group(0) @binding(5) var<storage, read_write> sums: array<f32>;
 
 @compute @workgroup_size(GROUP)
@@ -18,7 +18,7 @@ fn gather_moments(
 ) {
     let first = group_number(group, groups) * GROUP;
     let length = counters[COUNTER_SLOTS];
-    // Each group adds up GROUP splats. Neighbouring lanes read neighbouring numbers.
+    // Each group adds up the moments of GROUP splats. Neighbouring lanes read neighbouring numbers.
     for (var k = lane; k < GROUP * MOMENTS; k += GROUP) {
         let rank = first + k / MOMENTS;
         if rank >= length {

@@ -29,7 +29,7 @@ fn list_tiles(
             at++;
         }
     }
-    // The same sums, compiled for another kernel, may round differently. Entries left over belong to no tile.
+    // The same sums in another kernel may round differently, so entries may be left over. They belong to no tile.
     for (; at < end; at++) {
         entry_tiles[at] = band.tiles;
         entry_slots[at] = slot;

@@ -1,28 +1,29 @@
-// Sums, for each splat of a tile, how the tile's pixels change with it, as `cpu::moments` does. Each group has
-// one tile. While drawing, each lane has one pixel; while summing, lanes share the pixels of one splat.
-// The place of each entry in the lists, where its moments belong.
+// Sums for each splat of a tile how the tile's pixels change with the splat, like `cpu::moments`. Each workgroup has one
+// tile. While drawing, each lane has one pixel. While summing, several lanes share the pixels of one splat.
+//
+// Place of each entry in the lists, where its moments are stored.
 @group(0) @binding(7) var<storage, read> entry_places: array<u32>;
-// The finished picture, over black.
+// The finished picture over black.
 @group(0) @binding(8) var<storage, read> pixels: array<vec4<f32>>;
-// The moments of each entry. They are zeros at first, and stay so where nothing shows.
+// Moments of each entry. They begin as zeros, and stay zeros for splats that do not show.
 @group(0) @binding(9) var<storage, read_write> moments: array<f32>;
 
-// The numbers that a splat has for each pixel.
+// Number of values of a splat for each pixel.
 const PARTS: u32 = 3u;
-// The lanes that share a splat while summing, and the pixels that each of them sums.
+// Number of lanes that share a splat while summing, and number of pixels that each of these lanes sums.
 const SHARERS: u32 = GROUP / MOMENT_SPLATS;
 const SHARE: u32 = GROUP / SHARERS;
 
-// A batch of splats: the centre with the conic's xx and xy; the conic's yy with the opacity, red and green;
+// A batch of splats. The arrays have: the centre and the conic's xx and xy; the conic's yy, the opacity, red and green;
 // blue; the last diagonal element of the conic's root; the place in the lists.
 var<workgroup> batch_centre: array<vec4<f32>, MOMENT_BATCH>;
 var<workgroup> batch_conic: array<vec4<f32>, MOMENT_BATCH>;
 var<workgroup> batch_blue: array<f32, MOMENT_BATCH>;
 var<workgroup> batch_root: array<f32, MOMENT_BATCH>;
 var<workgroup> batch_place: array<u32, MOMENT_BATCH>;
-// At first the numbers of every pixel for some splats, then the moments that every lane has summed.
+// First the values of every pixel for some splats, then the moments that every lane has summed.
 var<workgroup> scratch: array<f32, PARTS * MOMENT_SPLATS * GROUP>;
-// One bit for each of those splats, set if the splat shows.
+// One bit for each of these splats, which is set if the splat shows.
 var<workgroup> shown: atomic<u32>;
 
 struct Pixel {
@@ -34,8 +35,8 @@ struct Pixel {
     finished: bool,
 }
 
-// Draws splat `k` of the batch as `blend` does. Returns the squared derivative by one channel of its colour; g;
-// and the largest change of a channel when the splat is left out. All are 0 where it does not show.
+// Draws splat `k` of the batch like `blend`. Returns the squared derivative by one channel of the splat's colour, g, and
+// the largest change of a channel when the splat is removed. All are 0 where the splat does not show.
 fn draw(pixel: ptr<function, Pixel>, k: u32) -> vec3<f32> {
     let conic = batch_conic[k];
     let alpha = alpha_at(batch_centre[k], conic.x, conic.y, (*pixel).at);
@@ -52,7 +53,7 @@ fn draw(pixel: ptr<function, Pixel>, k: u32) -> vec3<f32> {
     (*pixel).colour += own;
     (*pixel).transmittance = left;
     let behind = (*pixel).picture - (*pixel).colour;
-    // alpha / (1 - alpha) is the share of the light behind that one more unit of ln alpha takes away.
+    // alpha / (1 - alpha) is the share of the light from behind that is lost when ln alpha grows by one unit.
     let change = own - behind * (alpha / (1.0 - alpha));
     let sizes = abs(change);
     return vec3<f32>(weight * weight, dot(change, change), max(sizes.x, max(sizes.y, sizes.z)));
@@ -81,7 +82,7 @@ fn tile_moments(
     if inside {
         pixel.picture = pixels[(row + at.y) * frame.width + left + at.x].xyz;
     }
-    // These are used while summing.
+    // These values are used while summing.
     let splat = lane / SHARERS;
     let sharer = lane % SHARERS;
     for (var first = entries.x; first < entries.y; first += MOMENT_BATCH) {
@@ -164,7 +165,7 @@ fn tile_moments(
                 let which = lane % MOMENTS;
                 var sum = 0.0;
                 for (var p = 0u; p < SHARERS; p++) {
-                    // Lanes begin at different places, so that they read from different banks.
+                    // Lanes begin at different places, so that they read from different memory banks.
                     let value = scratch[which * GROUP + summed * SHARERS + (p + lane) % SHARERS];
                     sum = select(sum + value, max(sum, value), which == MOMENT_SUMS);
                 }

@@ -1,12 +1,12 @@
-// Works out sizes that are known only on the GPU: how many slots and entries there are, and how many groups
-// work on them.
+// Computes sizes that are known only on the GPU: the numbers of slots and entries, and the numbers of workgroups for
+// them.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
-// The first block of each chunk, and the end of the last.
+// First block of each chunk, and the end of the last chunk.
 @group(0) @binding(2) var<storage, read> chunk_blocks: array<u32>;
 @group(0) @binding(3) var<storage, read_write> counters: array<u32>;
 @group(0) @binding(4) var<storage, read_write> dispatches: array<u32>;
-// Where the entries of each slot begin in the tiles' lists. Only `plan_entries` reads it.
+// Place where the entries of each slot begin in the tile lists. Only `plan_entries` reads it.
 @group(0) @binding(5) var<storage, read> offsets: array<u32>;
 
 fn dispatch_groups(which: u32, n: u32) {

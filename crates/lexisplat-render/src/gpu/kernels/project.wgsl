@@ -1,4 +1,4 @@
-// Projects Gaussians in the world to ellipses on screen, as `cpu::project` does.
+// Projects Gaussians in the world to ellipses on screen, like `cpu::project`.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> starts: array<u32>;
@@ -8,14 +8,14 @@
 @group(0) @binding(5) var<storage, read> shapes: array<vec4<f32>>;
 // The centre, and the conic's xx and xy.
 @group(0) @binding(6) var<storage, read_write> centres: array<vec4<f32>>;
-// The conic's yy and determinant, the opacity, and the level of the quadratic form beyond which the opacity is
-// below ALPHA_MIN for sure.
+// The conic's yy and determinant, the opacity, and the level of the quadratic form. Beyond this level the opacity is
+// certainly below ALPHA_MIN.
 @group(0) @binding(7) var<storage, read_write> conics: array<vec4<f32>>;
 @group(0) @binding(8) var<storage, read_write> keys: array<u32>;
-// The tiles that it may touch: the first, and the first after them, each as column + row * 2^16.
+// The tiles that the Gaussian may touch: the first tile, and the first tile after the last, each as column + row * 2^16.
 @group(0) @binding(9) var<storage, read_write> rects: array<vec2<u32>>;
 
-// One of the three standard deviations, as a vector on screen.
+// Returns one of the three standard deviations as a vector on screen.
 fn on_screen(axis: vec3<f32>, jx: vec2<f32>, jy: vec2<f32>) -> vec2<f32> {
     let x = dot(frame.right, axis);
     let y = dot(frame.down, axis);
@@ -40,7 +40,7 @@ fn project(
     if slot >= end {
         return;
     }
-    // A slot that is left out touches no tile, and comes last in the order.
+    // A slot that is not drawn touches no tile, and comes last in the order.
     keys[slot] = KEY_LAST;
     rects[slot] = vec2<u32>(0u);
     let i = gaussians[slot] - chunk.first;
@@ -74,7 +74,7 @@ fn project(
     var a = x.x * x.x + y.x * y.x + u.x * u.x;
     let b = x.x * x.y + y.x * y.y + u.x * u.y;
     var c = x.y * x.y + y.y * y.y + u.y * u.y;
-    // The determinant as a sum of squares (Cauchy-Binet): never negative.
+    // The determinant is a sum of squares (Cauchy-Binet), so it is never negative.
     let plain = crossed(x, y) + crossed(y, u) + crossed(u, x);
     let det = plain + DILATION * (a + c) + DILATION * DILATION;
     if !(det > 0.0 && det < FAR_LIMIT) {
@@ -96,10 +96,10 @@ fn project(
     let level = 2.0 * (log(opacity / ALPHA_MIN) + POWER_SLACK);
     let grid = vec2<f32>(f32(frame.columns), f32(frame.rows));
     let tile = f32(TILE);
-    // INRIA's getRect. It truncates toward zero, which is the floor here: clamped numbers are not negative.
+    // INRIA's getRect truncates toward zero. The floor does the same here, because clamped numbers are not negative.
     let low = floor(clamp((centre - radius) / tile, vec2<f32>(0.0), grid));
     let high = floor(clamp((centre + radius + (tile - 1.0)) / tile, vec2<f32>(0.0), grid));
-    // The tiles with a pixel that the ellipse of `level` reaches, or a few more.
+    // The tiles with a pixel inside the ellipse of `level`, and possibly a few more.
     let reach = sqrt(level * vec2<f32>(a, c)) * (1.0 + REACH_SLACK) + REACH_MARGIN;
     let least = max(low, ceil(clamp((centre - reach - (tile - 1.0)) / tile, vec2<f32>(0.0), grid)));
     let most = min(high, floor(clamp((centre + reach) / tile + 1.0, vec2<f32>(0.0), grid)));

@@ -1,4 +1,4 @@
-// Works out the colour towards the camera of the Gaussians that have slots, as `radiance::Radiance::colour`.
+// Computes the colour towards the camera of the Gaussians that have slots, like `radiance::Radiance::colour`.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> starts: array<u32>;
@@ -6,7 +6,7 @@
 @group(0) @binding(4) var<storage, read> bodies: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read_write> colours: array<f32>;
 
-// The slot that this lane colours, or NO_SLOT.
+// Returns the slot that this lane colours, or NO_SLOT.
 fn slot_of(group: u32, lane: u32) -> u32 {
     let first = min(starts[chunk.first_block], frame.slots);
     let end = min(starts[chunk.first_block + chunk.blocks], frame.slots);
@@ -14,13 +14,13 @@ fn slot_of(group: u32, lane: u32) -> u32 {
     return select(NO_SLOT, slot, slot < end);
 }
 
-// The direction from the camera to the Gaussian. A length of 0 needs no guard: such a Gaussian is not in front
-// of the camera. INRIA's renderer and the CPU's have none either.
+// Returns the direction from the camera to the Gaussian. A length of 0 needs no guard, because such a Gaussian is not in
+// front of the camera. INRIA's renderer and the CPU renderer have no guard either.
 fn direction_to(i: u32) -> vec3<f32> {
     return normalize(bodies[i].xyz - frame.position);
 }
 
-// The values of the basis without DC, as `lexisplat::sh::rest_basis`. Those above the frame's degree are 0.
+// Returns the values of the basis without DC, like `lexisplat::sh::rest_basis`. Values above the frame's degree are 0.
 fn rest_basis(d: vec3<f32>) -> array<f32, MAX_BASIS> {
     var b: array<f32, MAX_BASIS>;
     let x = d.x;
@@ -67,7 +67,7 @@ fn rest_basis(d: vec3<f32>) -> array<f32, MAX_BASIS> {
     return b;
 }
 
-// Stores a colour. One that overflows becomes NO_COLOUR, and its splat draws nothing.
+// Stores a colour. A colour that overflows becomes NO_COLOUR, and its splat is not drawn.
 fn write_colour(slot: u32, dc: vec3<f32>, rest: vec3<f32>) {
     let sum = COLOUR_OFFSET + SH_C0 * dc + rest;
     let finite = all(abs(sum) < vec3<f32>(FAR_LIMIT));

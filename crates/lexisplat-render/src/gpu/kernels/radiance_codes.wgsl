@@ -1,4 +1,4 @@
-// Colours slots in the order they have.
+// Colours slots in their order.
 @compute @workgroup_size(GROUP)
 fn radiance(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -1,4 +1,5 @@
-// Dense SH. A row has the coefficients of a Gaussian in order, DC first, with red, green and blue side by side.
+// Dense SH. A row has the coefficients of a Gaussian in order, DC first. Red, green and blue of a coefficient are side by
+// side.
 @group(0) @binding(6) var<storage, read> rows: array<ROW_TYPE>;
 
 @compute @workgroup_size(GROUP)

@@ -1,5 +1,5 @@
-// Orders the group's slots by their number of nonzeros first. Lanes that run in step then have codes of similar
-// length, and none waits for a much longer one. The order of equal ones makes no difference.
+// First orders the slots of the group by number of nonzeros. Lanes that run in lockstep then have codes of similar
+// length, and none waits for a much longer code. The order of slots with equal numbers does not matter.
 var<workgroup> bins: array<atomic<u32>, COUNT_BINS>;
 var<workgroup> bin_ends: array<u32, COUNT_BINS>;
 var<workgroup> ordered: array<u32, GROUP>;

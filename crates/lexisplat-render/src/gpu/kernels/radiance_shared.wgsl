@@ -1,5 +1,5 @@
-// Keeps the dictionary in workgroup memory. Lanes that read different atoms at once then compete for banks
-// instead of cache lines.
+// Keeps the dictionary in workgroup memory. Lanes that read different atoms at once then compete for memory banks instead
+// of cache lines.
 var<workgroup> atoms_here: array<f32, DICTIONARY>;
 
 fn look(d: vec3<f32>) -> array<f32, MAX_BASIS> {

@@ -1,21 +1,22 @@
-// Sparse codes, which are never expanded: each atom is multiplied with the basis, and only three sums are kept.
+// Sparse codes. They are never expanded to dense SH: each atom is multiplied with the basis, and only three sums are
+// kept.
 @group(0) @binding(6) var<storage, read> base_colours: array<f32>;
-// For every COLUMN_GROUP Gaussians, the word at which their nonzeros begin, and a byte for each Gaussian: its
+// For every COLUMN_GROUP Gaussians: the word at which their nonzeros begin, and a byte for each Gaussian. The byte is its
 // number of nonzeros, or ESCAPED if it is stored exactly. The numbers of the escaped Gaussians follow.
 @group(0) @binding(7) var<storage, read> columns: array<u32>;
-// For every COLUMN_GROUP Gaussians, their atom numbers, then their values. The exact rows of the escaped Gaussians
+// For every COLUMN_GROUP Gaussians: their atom numbers, then their values. The exact rows of the escaped Gaussians
 // follow, of DIM floats each.
 @group(0) @binding(8) var<storage, read> nonzeros: array<u32>;
-// The atoms, of ATOM_VECTORS each. In atoms and rows coefficients are in order, with red, green and blue side by
-// side.
+// The atoms, of ATOM_VECTORS vectors each. In atoms and exact rows the coefficients are in order, with red, green and
+// blue of a coefficient side by side.
 @group(0) @binding(9) var<storage, read> atoms: array<vec4<f32>>;
 
 struct Column {
-    // The first word of the group's atom numbers.
+    // First word of the group's atom numbers.
     words: u32,
-    // The number of words of atom numbers before the values.
+    // Number of words of atom numbers before the values.
     index_words: u32,
-    // The number of the group's nonzeros before those of the Gaussian.
+    // Number of the group's nonzeros before those of the Gaussian.
     before: u32,
     count: u32,
     escaped: bool,
@@ -65,7 +66,7 @@ fn value_at(column: Column, k: u32) -> f32 {
     return select(pair.x, pair.y, at % 2u == 1u);
 }
 
-// Finds which exact row belongs to Gaussian `i` of the chunk, by binary search.
+// Returns the index of the exact row of Gaussian `i` of the chunk, by binary search.
 fn escape_of(i: u32) -> u32 {
     var low = 0u;
     var high = chunk.escapes;
@@ -84,22 +85,22 @@ fn base_colour(i: u32) -> vec3<f32> {
     return vec3<f32>(base_colours[3u * i], base_colours[3u * i + 1u], base_colours[3u * i + 2u]);
 }
 
-// The dot products of the three channels of the atom at `at` with the basis.
+// Returns the dot products of the three channels of the atom at `at` with the basis.
 fn seen(at: u32, b: array<f32, MAX_BASIS>) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
     // ATOM_TERMS
     return sum;
 }
 
-// The same of the exact row at `at`.
+// Returns the dot products of the three channels of the exact row at `at` with the basis.
 fn seen_exact(at: u32, b: array<f32, MAX_BASIS>) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
     // EXACT_TERMS
     return sum;
 }
 
-// Colours the Gaussian of `slot`, unless that is NO_SLOT. The path defines `look`, which prepares a direction
-// once for each Gaussian, and `atom_seen`, which evaluates an atom with it.
+// Colours the Gaussian of `slot`, unless `slot` is NO_SLOT. The path defines `look`, which prepares a direction once for
+// each Gaussian, and `atom_seen`, which evaluates an atom in that direction.
 fn colour_slot(slot: u32) {
     if slot == NO_SLOT {
         return;

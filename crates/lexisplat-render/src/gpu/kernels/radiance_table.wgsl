@@ -1,9 +1,9 @@
-// Looks each atom's radiance up in a table over directions, which `gpu::radiance_table` makes: the six faces of
-// a cube side by side, with one layer for each atom.
+// Reads the radiance of each atom from a table over directions, which `gpu::radiance_table` makes. A layer of the table
+// has the six faces of a cube side by side, and belongs to one atom.
 @group(0) @binding(10) var table: texture_2d_array<f32>;
 @group(0) @binding(11) var linear: sampler;
 
-// Where the table has direction `d`. The centres of the outer texels lie on the edges of a face, so that no
+// Returns the place of direction `d` in the table. The centres of the outer texels lie on the edges of a face, so that no
 // sample mixes two faces.
 fn look(d: vec3<f32>) -> vec2<f32> {
     let size = abs(d);

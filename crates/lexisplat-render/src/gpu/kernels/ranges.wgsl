@@ -1,4 +1,4 @@
-// Finds where each tile's list begins and ends among the sorted entries.
+// Finds where the list of each tile begins and ends among the sorted entries.
 @group(0) @binding(0) var<uniform> band: Band;
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> entry_tiles: array<u32>;

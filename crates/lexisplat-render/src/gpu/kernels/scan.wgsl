@@ -1,5 +1,5 @@
-// Exclusive prefix sums, in place. A sum that would overflow stays at the largest number. The length is what a
-// counter says, or `fixed` if that is not 0.
+// Exclusive prefix sums, in place. A sum that would overflow stays at the largest number. The length is the value of a
+// counter, or `fixed` if `fixed` is not 0.
 struct Scan {
     counter: u32,
     fixed_length: u32,
@@ -10,7 +10,7 @@ struct Scan {
 @group(0) @binding(0) var<uniform> scan: Scan;
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read_write> data: array<u32>;
-// The sums of the blocks.
+// Sums of the blocks.
 @group(0) @binding(3) var<storage, read_write> sums: array<u32>;
 
 var<workgroup> partial: array<u32, GROUP>;
@@ -26,7 +26,7 @@ fn plus(a: u32, b: u32) -> u32 {
     return a + min(b, 0xffffffffu - a);
 }
 
-// The sum of the values of the lanes below this one. Afterwards `partial[GROUP - 1]` is the sum of all.
+// Returns the sum of the values of the lanes below this lane. Afterwards `partial[GROUP - 1]` is the sum of all values.
 fn before(lane: u32, value: u32) -> u32 {
     workgroupBarrier();
     partial[lane] = value;

@@ -1,7 +1,8 @@
-// Gives each sorted entry its slot. While measuring, the sort moves the entries' places in the lists instead.
+// Gives each sorted entry its slot. While sensitivities are measured, the sort moves the places of entries in the lists
+// instead of their slots.
 @group(0) @binding(0) var<storage, read> counters: array<u32>;
 @group(0) @binding(1) var<storage, read> entry_places: array<u32>;
-// The slot of each entry, in the order the entries were listed in.
+// Slot of each entry, in the order in which the entries were listed.
 @group(0) @binding(2) var<storage, read> listed_slots: array<u32>;
 @group(0) @binding(3) var<storage, read_write> entry_slots: array<u32>;
 

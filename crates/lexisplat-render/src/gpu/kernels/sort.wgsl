@@ -1,18 +1,18 @@
 // One pass of a stable radix sort of (key, value) pairs, from the lowest digit up.
 struct Pass {
-    // The lowest bit of the digit.
+    // Lowest bit of the digit.
     shift: u32,
-    // The counters that hold the number of pairs and of blocks.
+    // Indices of the counters with the number of pairs and the number of blocks.
     length: u32,
     blocks: u32,
-    // 1 if the values are the places of their keys, as in the first pass of a sort of slots.
+    // 1 if the values are the places of their keys, as in the first pass of a sort of slots; otherwise 0.
     identity: u32,
 }
 
 @group(0) @binding(0) var<uniform> digit_pass: Pass;
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 @group(0) @binding(2) var<storage, read> keys: array<u32>;
-// Counts by digit, and for each digit by block.
+// Counts of keys by digit, and for each digit by block.
 @group(0) @binding(3) var<storage, read_write> histogram: array<u32>;
 @group(0) @binding(4) var<storage, read> values: array<u32>;
 @group(0) @binding(5) var<storage, read_write> keys_out: array<u32>;
@@ -49,8 +49,8 @@ fn sort_count(
     }
 }
 
-// For each pair of digits and each lane, the counts of both digits in one word. The scan replaces the counts by
-// the number of keys before the lane's own.
+// For each pair of digits and each lane: the counts of both digits in one word. The scan replaces the counts by the
+// number of keys before those of the lane.
 var<workgroup> tallies: array<u32, DIGIT_PAIRS * GROUP>;
 var<workgroup> segments: array<u32, GROUP>;
 var<workgroup> bases: array<u32, DIGITS>;
@@ -70,7 +70,7 @@ fn sort_scatter(
     for (var p = 0u; p < DIGIT_PAIRS; p++) {
         tallies[p * GROUP + lane] = 0u;
     }
-    // Each lane counts consecutive keys, which keeps the sort stable.
+    // Each lane counts consecutive keys, so that the sort is stable.
     let first = block * SORT_BLOCK + lane * SORT_ITEMS;
     var own: array<u32, SORT_ITEMS>;
     for (var k = 0u; k < SORT_ITEMS; k++) {
@@ -81,7 +81,7 @@ fn sort_scatter(
         }
     }
     workgroupBarrier();
-    // Exclusive sums over lanes. SEGMENTS lanes share a pair of digits, and each adds up one segment.
+    // Exclusive sums over lanes. SEGMENTS lanes share a pair of digits, and each lane adds up one segment.
     let at = (lane / SEGMENTS) * GROUP + (lane % SEGMENTS) * SEGMENT;
     var sum = 0u;
     for (var k = 0u; k < SEGMENT; k++) {

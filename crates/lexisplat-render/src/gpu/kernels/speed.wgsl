@@ -1,4 +1,4 @@
-// Measures what the GPU can do at best, to compare the stages with.
+// Measures the best rates of the GPU, for comparison with the stages.
 @group(0) @binding(0) var<storage, read> from_here: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read_write> to_there: array<vec4<f32>>;
 
@@ -34,7 +34,7 @@ fn multiply_add(
         c = c * factor + term;
         d = d * factor + term;
     }
-    // This is never true. It keeps the compiler from leaving the work out.
+    // This condition is never true. It keeps the compiler from removing the work.
     if a.x + b.y + c.z + d.w == -1.0 {
         to_there[0] = a + b + c + d;
     }

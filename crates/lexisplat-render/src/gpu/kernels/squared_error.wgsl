@@ -1,16 +1,16 @@
-// Sums the squared differences of two pictures, with channels clipped to 0..1, as `squared_error` on the processor.
-// Each workgroup sums ERROR_PIXELS pixels a lane, always in the same order.
+// Sums the squared differences of two pictures, with channels clipped to 0..1, like `squared_error` on the processor.
+// Each lane of a workgroup sums ERROR_PIXELS pixels, always in the same order.
 @group(0) @binding(0) var<uniform> extent: Extent;
 @group(0) @binding(1) var<storage, read> picture: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read> other: array<vec4<f32>>;
 // One sum for each workgroup.
 @group(0) @binding(3) var<storage, read_write> sums: array<f32>;
 
-// Laid out as `gpu::uniforms::Extent`.
+// A struct with the layout of `gpu::uniforms::Extent`.
 struct Extent {
     // Number of pixels that are compared.
     pixels: u32,
-    // Where the first workgroup stores its sum.
+    // Place where the first workgroup stores its sum.
     first_sum: u32,
     padding_a: u32,
     padding_b: u32,
@@ -18,7 +18,7 @@ struct Extent {
 
 var<workgroup> of_lanes: array<f32, GROUP>;
 
-// NaN becomes 0.
+// Returns the channels clipped to 0..1. NaN becomes 0.
 fn clipped(pixel: vec4<f32>) -> vec3<f32> {
     return select(vec3<f32>(0.0), min(pixel.xyz, vec3<f32>(1.0)), pixel.xyz > vec3<f32>(0.0));
 }

@@ -1,4 +1,4 @@
-// Shared by drawing a tile and measuring it. Each group has one tile, and each lane one pixel.
+// Code that drawing and measuring a tile share. Each workgroup has one tile, and each lane one pixel.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var<storage, read> ranges: array<vec2<u32>>;
@@ -8,11 +8,12 @@
 @group(0) @binding(6) var<storage, read> colours: array<f32>;
 
 var<workgroup> range: vec2<u32>;
-// The number of pixels that are not finished.
+// Number of pixels that are not finished.
 var<workgroup> open: atomic<u32>;
 var<workgroup> open_now: u32;
 
-// The tile's entries: the first, and the first after them. All lanes call this, before `any_open`.
+// Returns the entries of the tile: the first entry, and the first entry after the last. All lanes must call this, before
+// `any_open`.
 fn entries_of(tile: u32, lane: u32) -> vec2<u32> {
     if lane == 0u {
         range = vec2<u32>(0u);
@@ -25,7 +26,7 @@ fn entries_of(tile: u32, lane: u32) -> vec2<u32> {
     return workgroupUniformLoad(&range);
 }
 
-// Whether any pixel is not finished. All lanes call this.
+// Returns whether any pixel of the tile is not finished. All lanes must call this.
 fn any_open(lane: u32, finished: bool) -> bool {
     if !finished {
         atomicAdd(&open, 1u);
@@ -46,7 +47,7 @@ struct Splat {
     colour: vec3<f32>,
 }
 
-// The splat of an entry. One whose colour overflows draws nothing.
+// Returns the splat of an entry. A splat whose colour overflows is not drawn.
 fn splat_of(entry: u32) -> Splat {
     let slot = entry_slots[entry];
     let conic = conics[slot];
@@ -55,8 +56,8 @@ fn splat_of(entry: u32) -> Splat {
     return Splat(centres[slot], vec3<f32>(conic.xy, opacity), colour);
 }
 
-// The opacity of a splat at the pixel `here`, as `cpu::blend::alphas` works it out; 0 where it does not count.
-// The conic's xx and xy are beside the centre.
+// Returns the opacity of a splat at the pixel `here`, like `cpu::blend::alphas`; 0 where the splat does not count. The
+// conic's xx and xy are in `centre.zw`.
 fn alpha_at(centre: vec4<f32>, yy: f32, opacity: f32, here: vec2<f32>) -> f32 {
     let d = centre.xy - here;
     let power = -0.5 * (centre.z * d.x * d.x + yy * d.y * d.y) - centre.w * d.x * d.y;

@@ -1,22 +1,22 @@
-// Lists for every tile the splats that may touch it, from front to back, as `cpu::tiles` does.
+// Lists the splats that may touch each tile, from front to back, like `cpu::tiles`.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var<storage, read> counters: array<u32>;
-// The slots in order of depth.
+// Slots in the order of depth.
 @group(0) @binding(3) var<storage, read> order: array<u32>;
 @group(0) @binding(4) var<storage, read> rects: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read> centres: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read> conics: array<vec4<f32>>;
-// The number of tiles that each splat touches; after the scan, where its entries begin.
+// First the number of tiles that each splat touches; after the scan the place where its entries begin.
 @group(0) @binding(7) var<storage, read_write> offsets: array<u32>;
 
-// The rows of the band that `rect` covers: the first, and the first after them.
+// Returns the rows of the band that `rect` covers: the first row, and the first row after the last.
 fn rows_of(rect: vec2<u32>) -> vec2<u32> {
     return clamp(rect >> vec2<u32>(16u), vec2<u32>(band.first), vec2<u32>(band.first + band.rows));
 }
 
-// The columns of `rect` in which the splat may touch pixels of the row of tiles `row`: the first, and the first
-// after them.
+// Returns the columns of `rect` in which the splat may touch pixels of the row of tiles `row`: the first column, and the
+// first column after the last.
 fn columns_of(rect: vec2<u32>, centre: vec4<f32>, conic: vec4<f32>, row: u32) -> vec2<u32> {
     let columns = rect & vec2<u32>(0xffffu);
     if columns.x + 1u >= columns.y && ((rect.x >> 16u) + 1u >= (rect.y >> 16u)) {
@@ -28,7 +28,7 @@ fn columns_of(rect: vec2<u32>, centre: vec4<f32>, conic: vec4<f32>, row: u32) ->
     let det = conic.y;
     let level = conic.w;
     let tile = f32(TILE);
-    // The ellipse around the centre is a u^2 + 2 b u v + c v^2 = level.
+    // The boundary of the ellipse is a u^2 + 2 b u v + c v^2 = level, around the centre.
     let highest = sqrt(level * a / det);
     let widest = sqrt(level * c / det);
     let top = max(f32(row) * tile - centre.y - REACH_MARGIN, -highest);
@@ -36,7 +36,7 @@ fn columns_of(rect: vec2<u32>, centre: vec4<f32>, conic: vec4<f32>, row: u32) ->
     if top > bottom {
         return vec2<u32>(0u);
     }
-    // The height of its rightmost point. The leftmost point is opposite.
+    // Height of the rightmost point of the ellipse. The leftmost point is opposite.
     let turn = -b / c * widest;
     let right_at = clamp(turn, top, bottom);
     let left_at = clamp(-turn, top, bottom);
