@@ -1,7 +1,7 @@
 //! The decoder: from the ranges that are there, which may come in any order, to the values that are drawn.
 //!
-//! This folder, `bitstream/` and `entropy/` have all code that reads packed files. They also use `target.rs` and
-//! `canonical.rs` of `encode/`, because one function both encodes and decodes a part of the syntax.
+//! This folder, `bitstream/` and `entropy/` have all code that reads packed files. They use nothing of `encode/`, which the feature
+//! `encode` adds.
 
 pub(in crate::packed) mod available_ranges;
 pub(in crate::packed) mod chunk_decoder;
