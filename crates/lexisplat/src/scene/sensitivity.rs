@@ -145,8 +145,8 @@ impl Sensitivity {
         Self::guess_of_part(geometry, guessed_total(0.0, geometry))
     }
 
-    /// Estimates the sensitivity as [`Self::guess`] does, for a part of a scene. `total` is the [`guessed_total`] of the
-    /// whole scene.
+    /// Estimates the sensitivity as [`Self::guess`] does, for a part of a scene. `total` stands for the [`guessed_total`] of
+    /// the whole scene.
     pub(crate) fn guess_of_part(geometry: &Geometry, total: f64) -> Self {
         let n = geometry.len();
         let mut out = Self::zeros(n);
@@ -253,7 +253,7 @@ mod tests {
         let geometry = crate::support::testing::scene(400, 5).geometry;
         let guessed = Sensitivity::guess(&geometry);
         let mut measured = guessed.clone();
-        // The views saw only the first half of the scene, and saw one of its Gaussians hardly.
+        // The views saw only the first half of the scene, and hardly saw one of its Gaussians.
         for (i, weight) in measured.colour.iter_mut().enumerate() {
             *weight *= if i < 200 { 1.0 } else { 1e-9 };
         }

@@ -12,7 +12,7 @@ const BLOCK: usize = 32_768;
 /// A scene whose Gaussians are read a part at a time. A reader of any format implements this trait, and so does a scene in
 /// memory.
 ///
-/// All values read are finite, except those of extras.
+/// All values that [`Self::read`] gives are finite, except the values of extras.
 pub trait SplatSource {
     /// Returns the number of Gaussians.
     fn len(&self) -> usize;
@@ -38,7 +38,7 @@ pub trait SplatSource {
     }
 
     /// Returns the sources that this source consists of, one after the other, such as the tiles of a scene. The list is
-    /// empty if the source is a single one.
+    /// empty if the source does not consist of others.
     fn parts(&self) -> &[&dyn SplatSource] {
         &[]
     }

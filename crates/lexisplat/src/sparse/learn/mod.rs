@@ -163,7 +163,7 @@ pub(crate) fn learn_from(
 /// changes no atom. Rows that [`LearnOptions::sample`] leaves out are checked but not learned from. Without any rows, the
 /// atoms are unit axes, then random directions.
 ///
-/// `progress` is asked between rounds, but not while the first atoms are made. This takes half a minute for rows of 1024
+/// `progress` is asked between rounds, but not while the first atoms are made. Making them takes half a minute for rows of 1024
 /// values.
 ///
 /// The result depends only on the arguments, not on threads or CPU.

@@ -187,9 +187,9 @@ impl<'a> Careful<'a> {
         true
     }
 
-    /// Solves for the least-squares values of the chosen atoms. The values of the code are those of the scaled row times
-    /// two to the power `exponent`, rounded as they are stored. The error of the code is that of the scaled row. Each value
-    /// is rounded before the next value is solved for, so that the next value makes up for the rounding.
+    /// Returns the code with the least-squares values of the chosen atoms, and its error. The values are those of the
+    /// scaled row, times two to the power `exponent`, rounded as they are stored. The error is that of the scaled row. Each
+    /// value is rounded before the next value is solved for, so that the next value makes up for the rounding.
     fn solve<T: RowValue>(&self, exponent: i32, work: &mut Work) -> Found<T> {
         let mut right = work.amplitudes.clone();
         let mut code = Vec::with_capacity(right.len());
