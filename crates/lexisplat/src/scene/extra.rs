@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Extra {
     /// Property name in the PLY.
     pub name: String,
-    /// One value a Gaussian.
+    /// One value for each Gaussian.
     pub values: ExtraValues,
 }
 
@@ -21,7 +21,7 @@ macro_rules! scalar_types {
             $(#[doc = concat!("`", $name, "` or `", $alias, "`.")] $variant,)*
         }
 
-        /// Values of an [`Extra`] in the type the file gave them.
+        /// Values of an [`Extra`], in the type that the file gave them.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[non_exhaustive]
         pub enum ExtraValues {
@@ -29,47 +29,47 @@ macro_rules! scalar_types {
         }
 
         impl ScalarType {
-            /// The name in the first PLY specification, which every reader knows.
+            /// Returns the name of the type in the first PLY specification, which every reader knows.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name,)* }
             }
 
-            /// Bytes of one value in a binary file.
+            /// Returns the number of bytes of one value in a binary file.
             #[must_use]
             pub fn bytes(self) -> usize {
                 match self { $(Self::$variant => size_of::<$type>(),)* }
             }
 
-            /// The type called `word` in a PLY.
+            /// Returns the type that a PLY calls `word`, if any.
             pub(crate) fn parse(word: &str) -> Option<Self> {
                 match word { $($name | $alias => Some(Self::$variant),)* _ => None }
             }
 
-            /// The type in a safetensors file.
+            /// Returns the type in a safetensors file.
             pub(crate) fn dtype(self) -> Dtype {
                 match self { $(Self::$variant => Dtype::$variant,)* }
             }
 
-            /// The type that is `dtype` in a safetensors file.
+            /// Returns the type that is `dtype` in a safetensors file, if any.
             pub(crate) fn of_dtype(dtype: Dtype) -> Option<Self> {
                 match dtype { $(Dtype::$variant => Some(Self::$variant),)* _ => None }
             }
         }
 
         impl ExtraValues {
-            /// Type of the values.
+            /// Returns the type of the values.
             #[must_use]
             pub fn scalar_type(&self) -> ScalarType {
                 match self { $(Self::$variant(_) => ScalarType::$variant,)* }
             }
 
-            /// No values of this type.
+            /// Creates an empty list of values of type `scalar`.
             pub(crate) fn none(scalar: ScalarType) -> Self {
                 match scalar { $(ScalarType::$variant => Self::$variant(Vec::new()),)* }
             }
 
-            /// Appends values of the same type.
+            /// Appends `other`, whose values have the same type.
             pub(crate) fn append(&mut self, other: Self) {
                 match (self, other) {
                     $((Self::$variant(to), Self::$variant(from)) => to.extend(from),)*
@@ -110,7 +110,7 @@ macro_rules! for_extra {
 }
 pub(crate) use for_extra;
 
-/// Evaluates `$body`, in which the type `$scalar` is the one that `$ty` stands for.
+/// Evaluates `$body`, in which `$scalar` is the Rust type that `$ty` stands for.
 macro_rules! with_scalar {
     ($ty:expr, $scalar:ident => $body:expr) => {
         $crate::scene::extra::with_scalar!(
@@ -129,26 +129,26 @@ macro_rules! with_scalar {
 pub(crate) use with_scalar;
 
 impl Extra {
-    /// The values of Gaussians `range`, which are all there, under the same name.
+    /// Returns the values of Gaussians `range` under the same name. All Gaussians of the range must exist.
     pub(crate) fn slice(&self, range: std::ops::Range<usize>) -> Self {
         Self { name: self.name.clone(), values: for_extra!(&self.values, v => v[range].to_vec().into()) }
     }
 }
 
 impl ExtraValues {
-    /// Number of values.
+    /// Returns the number of values.
     #[must_use]
     pub fn len(&self) -> usize {
         for_extra!(self, v => v.len())
     }
 
-    /// Whether there are no values.
+    /// Returns whether there are no values.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Bytes of one value.
+    /// Returns the number of bytes of one value.
     #[must_use]
     pub fn width(&self) -> usize {
         self.scalar_type().bytes()

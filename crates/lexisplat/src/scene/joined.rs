@@ -12,13 +12,14 @@ use crate::support::limits::{Limits, MAX_GAUSSIANS};
 
 /// Subject of the warning that rounding is coarse.
 const UNITED: &str = "32-bit floats, relative to one offset for all tiles,";
-/// Gaussians of a tile that are looked at for how far rounding moves them: the first ones. How far depends on the offsets.
+/// Number of Gaussians of a tile, from its first on, that tell how far rounding moves positions. This distance depends on
+/// the offsets.
 const ROUNDED: usize = 4096;
 
 /// A scene of several tiles, one after the other.
 pub struct Joined<'a> {
     tiles: Vec<&'a dyn SplatSource>,
-    /// Of each tile the number of Gaussians before it; then their number in all.
+    /// For each tile, the number of Gaussians before it; then the number of all Gaussians.
     firsts: Vec<usize>,
     empty: Splats,
     warnings: Vec<String>,
@@ -31,12 +32,13 @@ impl std::fmt::Debug for Joined<'_> {
 }
 
 impl<'a> Joined<'a> {
-    /// Joins `tiles`, each with its name. Comments are those of all, without repetitions, and positions are relative to one
-    /// offset ([`Offset::shared`]). A warning names each tile whose positions that rounds coarsely.
+    /// Joins `tiles`, each with its name. The scene has the comments of all tiles, without repetitions. Its positions are
+    /// relative to one offset ([`Offset::shared`]). A warning names each tile whose positions this offset rounds coarsely.
     ///
     /// # Errors
-    /// [`Error::Format`] that names a tile without Gaussians or with another degree, other extras or another mark than the first,
-    /// [`Error::Parameter`] for no tiles, [`Error::Limit`] for too many Gaussians, and errors of reading a tile.
+    /// [`Error::Format`] that names a tile without Gaussians, or a tile with another degree, other extras or another
+    /// antialiasing mark than the first tile. [`Error::Parameter`] for no tiles, [`Error::Limit`] for too many Gaussians,
+    /// and errors of reading a tile.
     pub fn new(tiles: &[(String, &'a dyn SplatSource)]) -> Result<Self> {
         let mut firsts = vec![0_usize];
         let mut empty: Option<Splats> = None;
@@ -60,7 +62,8 @@ impl<'a> Joined<'a> {
     }
 }
 
-/// How far positions of `tile` move when they become relative to `offset`; `None` if they are so already.
+/// Returns how far positions of `tile` move when they become relative to `offset`; `None` if they are relative to it
+/// already.
 fn rounding(tile: &dyn SplatSource, offset: Option<Offset>) -> Result<Option<Rounding>> {
     let mut some = tile.empty();
     if some.meta.offset == offset {
@@ -144,7 +147,7 @@ mod tests {
         assert!(told[0].contains("move positions by up to"), "{told:?}");
     }
 
-    /// However much is read at a time.
+    /// The tiles have these positions in the whole scene and in any part of it.
     #[test]
     fn tiles_with_other_offsets_lie_beside_each_other() {
         let offset = |x| Offset::new([x, 0.0, 4e6]).unwrap();

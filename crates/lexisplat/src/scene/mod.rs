@@ -1,4 +1,4 @@
-//! Dense scenes: Gaussians, SH, sources to read them from, sensitivity of pictures, statistics.
+//! Dense scenes: Gaussians, SH, sources to read scenes from, sensitivity of pictures, statistics.
 
 pub(crate) mod extra;
 pub(crate) mod joined;

@@ -1,33 +1,34 @@
-//! How far rounded positions may be from where they were, against the sizes of Gaussians.
+//! The distance by which rounding moves positions, against the sizes of Gaussians.
 
-/// Largest rounding that is not worth a word, as a share of the median size: pictures cannot show a hundredth of a
+/// Largest move by rounding that needs no warning, as a share of the median size. Pictures cannot show a hundredth of a
 /// Gaussian's standard deviation.
 const COARSE: f64 = 0.01;
-/// Gaussians whose sizes and positions stand for those of all.
+/// Largest number of Gaussians whose sizes and positions stand for those of all Gaussians.
 const SAMPLE: usize = 4096;
 
-/// By how much rounding moves a scene's positions at most, and the size of its Gaussians.
+/// The largest move of a scene's positions by rounding, and the size of the scene's Gaussians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounding {
     /// The largest move along an axis, in the scene's units.
     pub error: f64,
-    /// The median of the middle one of the three standard deviations of each Gaussian, in the scene's units.
+    /// The median over Gaussians of the middle one of the three standard deviations, in the scene's units.
     pub size: f64,
 }
 
 impl Rounding {
-    /// Whether the move is above a hundredth of the size.
+    /// Returns whether the move is above a hundredth of the size.
     #[must_use]
     pub fn is_coarse(&self) -> bool {
         self.error > COARSE * self.size
     }
 
-    /// The move as a share of the size.
+    /// Returns the move as a share of the size; 0 if nothing moves.
     pub(crate) fn share(&self) -> f64 {
         if self.error > 0.0 { self.error / self.size } else { 0.0 }
     }
 
-    /// A sentence with both numbers, if the move is coarse. `what` is what rounds, such as `32-bit floats`.
+    /// Returns a sentence with both numbers, if the move is coarse. `what` names the cause of the rounding, such as `32-bit
+    /// floats`.
     #[must_use]
     pub fn warning(&self, what: &str) -> Option<String> {
         let Self { error, size } = self;
@@ -41,14 +42,14 @@ impl Rounding {
         self.is_coarse().then(text)
     }
 
-    /// The middle one of three standard deviations, which are given by their natural logarithms.
+    /// Returns the middle one of three standard deviations, which are given by their natural logarithms.
     #[must_use]
     pub fn size_of(scales: [f32; 3]) -> f64 {
         let [a, b, c] = scales;
         libm::exp(f64::from(a.min(b).max(a.max(b).min(c))))
     }
 
-    /// The median of `sizes`; 0 if there are none.
+    /// Returns the median of `sizes`; 0 if there are none.
     #[must_use]
     pub fn median(mut sizes: Vec<f64>) -> f64 {
         let middle = sizes.len() / 2;
@@ -57,12 +58,12 @@ impl Rounding {
     }
 }
 
-/// Of how many Gaussians one is looked at, of a scene of `count`. At least 1.
+/// Returns the step between the Gaussians that are looked at in a scene of `count` Gaussians. It is at least 1.
 pub(crate) fn sample(count: usize) -> usize {
     count.div_ceil(SAMPLE).max(1)
 }
 
-/// A number with two digits that count.
+/// Returns `value` as text, with at least two significant digits.
 fn short(value: f64) -> String {
     if !(1e-4..1e5).contains(&value) {
         return format!("{value:.1e}");

@@ -1,55 +1,56 @@
-//! How much pictures change with each value of each Gaussian, as plain numbers.
+//! The change of pictures with each value of each Gaussian, as plain numbers.
 
 use crate::scene::splats::{Geometry, filter};
 use crate::support::maths;
 
-/// For each Gaussian the expected squared change of a picture's colour values, averaged over pixels and
-/// channels, for a squared error of 1 in one of its values (the diagonal of a Gauss-Newton matrix).
+/// The sensitivity of pictures to the values of Gaussians. For each value of each Gaussian, it is the expected squared
+/// change of a picture's colour values, averaged over pixels and channels, for a squared error of 1 in that value (the
+/// diagonal of a Gauss-Newton matrix).
 ///
-/// A renderer measures it; [`Sensitivity::guess`] needs none.
+/// A renderer measures the sensitivity; [`Sensitivity::guess`] needs no renderer.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sensitivity {
-    /// By one channel of the colour, for each channel alike.
+    /// Sensitivity to one channel of the colour, which is the same for each channel.
     pub colour: Vec<f32>,
-    /// By the logarithm of the opacity (after the sigmoid).
+    /// Sensitivity to the logarithm of the opacity (after the sigmoid).
     pub opacity: Vec<f32>,
-    /// By the position, in world units: the symmetric matrix xx, xy, xz, yy, yz, zz.
+    /// Sensitivity to the position, in world units: the symmetric matrix xx, xy, xz, yy, yz, zz.
     pub position: Vec<[f32; 6]>,
-    /// By the logarithm of the standard deviation along each axis, in the scene's order.
+    /// Sensitivity to the logarithm of the standard deviation along each axis, in the scene's order.
     pub scale: Vec<[f32; 3]>,
-    /// By a rotation about each of the Gaussian's own axes, in radians.
+    /// Sensitivity to a rotation about each of the Gaussian's own axes, in radians.
     pub rotation: Vec<[f32; 3]>,
-    /// Largest change of any colour value of any picture when the Gaussian is left out; infinite where
-    /// that is not known.
+    /// Largest change of any colour value of any picture when the Gaussian is left out; infinite where this change is not
+    /// known.
     pub removal: Vec<f32>,
-    /// Mean squared change of the one picture that changes most when the Gaussian is left out; 0 where that is not
+    /// Mean squared change of the one picture that changes most when the Gaussian is left out; 0 where this change is not
     /// known.
     pub removal_view: Vec<f32>,
 }
 
-/// Squared change of a picture by the opacity, as a share of that by the colour. This and the shares below are
-/// averages of scenes measured with a renderer.
+/// Sensitivity to the opacity, as a share of the sensitivity to the colour. This share and the shares below are averages of
+/// scenes measured with a renderer.
 const CONTRAST: f32 = 0.08;
-/// The same share for the standard deviation along each axis, longest first.
+/// Sensitivity to the standard deviation along each axis, longest first, as a share of the sensitivity to the opacity.
 const SCALE_SHARES: [f32; 3] = [0.6, 0.1, 0.05];
-/// The same share for a turn, for each squared unit of lever.
+/// Sensitivity to a turn, for each squared unit of lever, as a share of the sensitivity to the opacity.
 const ROTATION_SHARE: f32 = 0.1;
 
-/// Measured weights are about proportional to these powers of the opacity and of the product of the two
-/// longest standard deviations.
+/// Powers of the opacity and of the product of the two longest standard deviations. Measured weights are about proportional
+/// to both.
 const ALPHA_POWER: f32 = 1.7;
 const AREA_POWER: f32 = 0.6;
-/// Smallest sum of guessed weights. The reciprocal of a smaller one is no f32.
+/// Smallest sum of guessed weights. The reciprocal of a much smaller sum is not a finite f32.
 const LEAST_TOTAL: f64 = 1e-30;
-/// A weight below this share of the 90th percentile of weights counts as not seen.
+/// Share of the 90th percentile of weights. A weight that is not above this share counts as not seen.
 const UNSEEN: f32 = 1e-4;
 
-/// Least weight of a Gaussian, as a share of the guessed one. With steps at most 2.6 times as large as the guess would
-/// give, a file is not much worse than one of the guess wherever it is looked at from.
+/// Smallest weight of a Gaussian, as a share of its guessed weight. Steps are then at most 2.6 times as large as with the
+/// guess. From any viewpoint, a file is therefore not much worse than a file made with the guess.
 const LEAST_OF_GUESS: f32 = 0.15;
 
 impl Sensitivity {
-    /// The sensitivity of pictures that depend on none of `count` Gaussians.
+    /// Returns the sensitivity of pictures that depend on none of `count` Gaussians.
     #[must_use]
     pub fn zeros(count: usize) -> Self {
         Self {
@@ -63,19 +64,19 @@ impl Sensitivity {
         }
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         self.colour.len()
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.colour.is_empty()
     }
 
-    /// Sensitivities of Gaussian `i` to its colour and to the logarithm of its opacity.
+    /// Returns the sensitivities to the colour of Gaussian `i` and to the logarithm of its opacity.
     ///
     /// # Panics
     /// If there is no Gaussian `i`.
@@ -84,13 +85,13 @@ impl Sensitivity {
         [self.colour[i], self.opacity[i]]
     }
 
-    /// [`Self::appearance`] of all Gaussians.
+    /// Returns [`Self::appearance`] of all Gaussians.
     #[must_use]
     pub fn appearances(&self) -> Vec<[f32; 2]> {
         (0..self.len()).map(|i| self.appearance(i)).collect()
     }
 
-    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
+    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry for each Gaussian.
     ///
     /// # Panics
     /// If `keep` differs in length.
@@ -105,8 +106,8 @@ impl Sensitivity {
         filter(&mut self.removal_view, keep);
     }
 
-    /// The sensitivity of a scene of which [`Splats::gathered`](crate::Splats::gathered) made this one: entry `k` becomes entry
-    /// `order[k]`.
+    /// Returns the sensitivity in the order that the scene had before [`Splats::gathered`](crate::Splats::gathered): entry
+    /// `k` becomes entry `order[k]`.
     ///
     /// # Panics
     /// If `order` is not a permutation of the Gaussians.
@@ -127,8 +128,8 @@ impl Sensitivity {
         out
     }
 
-    /// Multiplies the sensitivity by `factor`: pictures of which only one in ten shows these Gaussians depend on them by a tenth. The
-    /// largest change of one picture stays.
+    /// Multiplies all sensitivities except `removal` by `factor`. For example, if only one picture in ten shows these
+    /// Gaussians, pictures depend on them by a tenth. `removal`, the largest change of one picture, stays as it is.
     pub(crate) fn scale(&mut self, factor: f32) {
         let shapes = self.position.as_flattened_mut().iter_mut();
         let shapes = shapes.chain(self.scale.as_flattened_mut()).chain(self.rotation.as_flattened_mut());
@@ -136,15 +137,16 @@ impl Sensitivity {
         whole.chain(shapes).for_each(|v| *v *= factor);
     }
 
-    /// An estimate from the Gaussians alone: opaque and large ones weigh most. It does not know which
-    /// Gaussians hide others, so files made with it are larger than files of the same quality made with a
+    /// Estimates the sensitivity from the Gaussians alone. Opaque and large Gaussians weigh most. The estimate does not
+    /// know which Gaussians hide others, so files made with it are larger than files of the same quality made with a
     /// measured sensitivity.
     #[must_use]
     pub fn guess(geometry: &Geometry) -> Self {
         Self::guess_of_part(geometry, guessed_total(0.0, geometry))
     }
 
-    /// [`Self::guess`] of a part of a scene whose [`guessed_total`] is `total`.
+    /// Estimates the sensitivity as [`Self::guess`] does, for a part of a scene. `total` stands for the [`guessed_total`] of
+    /// the whole scene.
     pub(crate) fn guess_of_part(geometry: &Geometry, total: f64) -> Self {
         let n = geometry.len();
         let mut out = Self::zeros(n);
@@ -157,7 +159,8 @@ impl Sensitivity {
         out
     }
 
-    /// Estimates everything of Gaussian `i` except its removal from its sensitivity to colour.
+    /// Sets the sensitivities of Gaussian `i`, except for its removal, to estimates from its sensitivity to colour,
+    /// `colour`.
     fn set_guess(&mut self, geometry: &Geometry, i: usize, colour: f32) {
         let shape = CONTRAST * colour;
         self.colour[i] = colour;
@@ -177,12 +180,13 @@ impl Sensitivity {
         self.position[i] = [along, 0.0, 0.0, along, 0.0, along];
     }
 
-    /// Mixes the measured sensitivity with the guessed one, which does not depend on views. Each weight becomes
-    /// the geometric mean of both, in which the guessed one has the exponent `share`. Gaussians that the views
-    /// hardly showed keep a weight, because other views may show them. `geometry` is that of the same Gaussians.
+    /// Mixes the measured sensitivity with the guessed sensitivity, which does not depend on views. Each weight becomes the
+    /// geometric mean of the measured and the guessed weight, in which the guessed weight has the exponent `share`.
+    /// Gaussians that the views hardly showed keep a weight, because other views may show them. `geometry` has the same
+    /// Gaussians.
     ///
     /// # Panics
-    /// If the two differ in length.
+    /// If the sensitivity and `geometry` differ in length.
     pub fn blend_with_prior(&mut self, geometry: &Geometry, share: f32) {
         assert_eq!(self.len(), geometry.len(), "one entry a Gaussian in both");
         let n = self.len();
@@ -225,12 +229,13 @@ impl Sensitivity {
     }
 }
 
-/// Adds the expected weights of all Gaussians, before they are scaled, to `sum`, one after the other.
+/// Returns `sum` plus the guessed weights of all Gaussians, before they are scaled. The weights are added one after the
+/// other.
 pub(crate) fn guessed_total(sum: f64, geometry: &Geometry) -> f64 {
     (0..geometry.len()).fold(sum, |sum, i| sum + f64::from(guessed_weight(geometry, i)))
 }
 
-/// The expected weight of a Gaussian before it is scaled.
+/// Returns the guessed weight of Gaussian `i` before it is scaled.
 fn guessed_weight(geometry: &Geometry, i: usize) -> f32 {
     let scales = geometry.scales[i];
     let [longest, middle, _] = maths::longest_first(scales).map(|k| scales[k]);
@@ -248,7 +253,7 @@ mod tests {
         let geometry = crate::support::testing::scene(400, 5).geometry;
         let guessed = Sensitivity::guess(&geometry);
         let mut measured = guessed.clone();
-        // Views that saw the first half of the scene only, and some of it hardly.
+        // The views saw only the first half of the scene, and hardly saw one of its Gaussians.
         for (i, weight) in measured.colour.iter_mut().enumerate() {
             *weight *= if i < 200 { 1.0 } else { 1e-9 };
         }
@@ -258,7 +263,7 @@ mod tests {
         let unit = total(&measured) / total(&guessed);
         let shares = (0..400).map(|i| f64::from(measured.colour[i]) / (f64::from(guessed.colour[i]) * unit));
         let least = shares.fold(f64::INFINITY, f64::min);
-        // The sum of all weights is kept, which changes each of them a little.
+        // The sum of all weights is kept, which changes each weight a little.
         let expected = f64::from(LEAST_OF_GUESS);
         assert!((0.8 * expected..1.25 * expected).contains(&least), "{least}");
     }

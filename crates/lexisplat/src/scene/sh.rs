@@ -1,33 +1,32 @@
 //! Real spherical harmonics as 3DGS uses them: degrees, coefficient layout, basis values.
 //!
-//! A Gaussian of degree `l` has `(l + 1)^2` coefficients a channel. The first one, DC, is kept apart;
-//! the rest form the vector this project compresses. That vector is **channel-major**, as `f_rest_*`
-//! in a PLY: all of red, then all of green, then all of blue (INRIA `gaussian_model.py`, `save_ply`,
-//! `transpose(1, 2).flatten`).
+//! A Gaussian of degree `l` has `(l + 1)^2` coefficients in each channel. The first coefficient, DC, is kept apart. The
+//! others form the SH-rest vector, which this project compresses. That vector is **channel-major**, as `f_rest_*` in a PLY:
+//! all of red, then all of green, then all of blue (INRIA `gaussian_model.py`, `save_ply`, `transpose(1, 2).flatten`).
 
 use serde::{Deserialize, Serialize};
 
 use crate::support::error::{Error, Result};
 
-/// Colour channels.
+/// Number of colour channels.
 pub const CHANNELS: usize = 3;
 /// Highest SH degree read or written.
 pub const MAX_DEGREE: u8 = 4;
-/// Coefficients a channel at [`MAX_DEGREE`], DC included.
+/// Number of coefficients of a channel at [`MAX_DEGREE`], DC included.
 pub const MAX_COEFFICIENTS: usize = 25;
-/// Longest SH-rest vector: degree 4, three channels, no DC.
+/// Length of the longest SH-rest vector: degree 4, three channels, no DC.
 pub const MAX_REST: usize = CHANNELS * (MAX_COEFFICIENTS - 1);
 
-/// Degree 0 (INRIA `utils/sh_utils.py`).
+/// Factor of the basis function of degree 0 (INRIA `utils/sh_utils.py`).
 pub const C0: f32 = 0.282_094_79;
-/// Degree 1.
+/// Factor of the basis functions of degree 1.
 pub const C1: f32 = 0.488_602_51;
-/// Degree 2, in coefficient order.
+/// Factors of the basis functions of degree 2, in coefficient order.
 pub const C2: [f32; 5] = [1.092_548_4, -1.092_548_4, 0.315_391_57, -1.092_548_4, 0.546_274_2];
-/// Degree 3, in coefficient order.
+/// Factors of the basis functions of degree 3, in coefficient order.
 pub const C3: [f32; 7] =
     [-0.590_043_6, 2.890_611_4, -0.457_045_8, 0.373_176_34, -0.457_045_8, 1.445_305_7, -0.590_043_6];
-/// Degree 4, in the order gsplat uses (INRIA stops at degree 3).
+/// Factors of the basis functions of degree 4, in the order gsplat uses (INRIA stops at degree 3).
 pub const C4: [f32; 9] = [
     2.503_342_9,
     -1.770_130_8,
@@ -39,7 +38,7 @@ pub const C4: [f32; 9] = [
     -1.770_130_8,
     0.625_835_7,
 ];
-/// Added to the evaluated SH before the clamp at zero (INRIA `forward.cu`, `computeColorFromSH`).
+/// Number added to the evaluated SH before the clamp at zero (INRIA `forward.cu`, `computeColorFromSH`).
 pub const COLOUR_OFFSET: f32 = 0.5;
 
 /// An SH degree, 0 to [`MAX_DEGREE`].
@@ -62,19 +61,19 @@ impl From<ShDegree> for u8 {
 }
 
 impl ShDegree {
-    /// No view dependence.
+    /// Degree 0, which has no view dependence.
     pub const ZERO: Self = Self(0);
     /// The first view-dependent degree.
     pub const ONE: Self = Self(1);
     pub(crate) const TWO: Self = Self(2);
-    /// What INRIA's trainer writes.
+    /// The degree that INRIA's trainer writes.
     pub const THREE: Self = Self(3);
     pub(crate) const FOUR: Self = Self(4);
 
-    /// The degree, if it is at most [`MAX_DEGREE`].
+    /// Creates an SH degree of at most [`MAX_DEGREE`].
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a larger one.
+    /// [`Error::Parameter`] for a larger degree.
     pub fn new(degree: u8) -> Result<Self> {
         if degree <= MAX_DEGREE {
             Ok(Self(degree))
@@ -83,31 +82,31 @@ impl ShDegree {
         }
     }
 
-    /// The degree whose SH-rest vector has `rest` values (0, 9, 24, 45 or 72), if any.
+    /// Returns the degree whose SH-rest vector has `rest` values (0, 9, 24, 45 or 72), if any.
     #[must_use]
     pub fn from_rest(rest: usize) -> Option<Self> {
         (0..=MAX_DEGREE).map(Self).find(|d| d.rest() == rest)
     }
 
-    /// The degree as a number.
+    /// Returns the degree as a number.
     #[must_use]
     pub fn get(self) -> u8 {
         self.0
     }
 
-    /// Coefficients of one channel, DC included: 1, 4, 9, 16 or 25.
+    /// Returns the number of coefficients of one channel, DC included: 1, 4, 9, 16 or 25.
     #[must_use]
     pub fn coefficients(self) -> usize {
         (usize::from(self.0) + 1) * (usize::from(self.0) + 1)
     }
 
-    /// Coefficients of one channel without DC: 0, 3, 8, 15 or 24.
+    /// Returns the number of coefficients of one channel without DC: 0, 3, 8, 15 or 24.
     #[must_use]
     pub fn rest_per_channel(self) -> usize {
         self.coefficients() - 1
     }
 
-    /// Length of the SH-rest vector over three channels: 0, 9, 24, 45 or 72.
+    /// Returns the length of the SH-rest vector over three channels: 0, 9, 24, 45 or 72.
     #[must_use]
     pub fn rest(self) -> usize {
         CHANNELS * self.rest_per_channel()
@@ -120,8 +119,8 @@ impl std::fmt::Display for ShDegree {
     }
 }
 
-/// Values of the basis functions without DC for the unit vector `direction`, which points from the
-/// camera to the Gaussian. Entry `k` belongs to coefficient `k + 1`; entries above `degree` are 0.
+/// Returns the values of the basis functions without DC for the unit vector `direction`, which points from the camera to
+/// the Gaussian. Entry `k` belongs to coefficient `k + 1`; entries above `degree` are 0.
 ///
 /// Source: INRIA `diff-gaussian-rasterization` 59f5f77, `forward.cu`, `computeColorFromSH`; degree 4
 /// as in gsplat.
@@ -180,8 +179,8 @@ mod tests {
         assert!(ShDegree::new(5).is_err());
     }
 
-    /// The error bound in docs/METHOD.md rests on this: averaged over the sphere, products of basis
-    /// functions are the identity over 4 pi.
+    /// Averaged over the sphere, products of basis functions are the identity over 4 pi. The error bound in docs/METHOD.md
+    /// rests on this.
     #[test]
     fn basis_is_orthonormal() {
         let degree = ShDegree::new(4).unwrap();

@@ -6,55 +6,56 @@ use std::ops::Range;
 use crate::scene::splats::{Geometry, Splats, all_finite};
 use crate::support::error::{Error, Result};
 
-/// Gaussians among which rows are looked for together: as many as a packed file decodes together.
+/// Number of Gaussians in a block. Rows in one block are read together. A packed file decodes as many Gaussians together.
 const BLOCK: usize = 32_768;
 
-/// A scene whose Gaussians are read a part at a time. A reader of any format implements it, and so does a
-/// scene in memory.
+/// A scene whose Gaussians are read a part at a time. A reader of any format implements this trait, and so does a scene in
+/// memory.
 ///
-/// All values read are finite, except those of extras.
+/// All values that [`Self::read`] gives are finite, except the values of extras.
 pub trait SplatSource {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     fn len(&self) -> usize;
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// A scene without Gaussians that has the degree, the comments and marks, and the names and types of extras
-    /// of this one. [`Self::read`] fills it.
+    /// Returns a scene without Gaussians that has the degree, the comments and marks, and the names and types of extras of
+    /// the source. [`Self::read`] fills it.
     fn empty(&self) -> Splats;
 
-    /// Whether [`Self::read`] gives normals.
+    /// Returns whether [`Self::read`] gives normals.
     fn has_normals(&self) -> bool;
 
-    /// Bytes of one Gaussian in the source, which is the unit of progress.
+    /// Returns the number of bytes of one Gaussian in the source. Progress counts these bytes.
     fn row_bytes(&self) -> u64;
 
-    /// Size of the source, in bytes. By default that of the Gaussians.
+    /// Returns the size of the source in bytes. By default, it is the size of all Gaussians.
     fn source_bytes(&self) -> u64 {
         (self.len() as u64).saturating_mul(self.row_bytes())
     }
 
-    /// The sources that it consists of, one after the other: the tiles of a scene. None if it is one itself.
+    /// Returns the sources that this source consists of, one after the other, such as the tiles of a scene. The list is
+    /// empty if the source does not consist of others.
     fn parts(&self) -> &[&dyn SplatSource] {
         &[]
     }
 
-    /// What is odd about the source, one sentence each.
+    /// Returns the warnings about the source, one sentence each.
     fn warnings(&self) -> &[String] {
         &[]
     }
 
-    /// Reads Gaussians `range` into `part`, which came from [`Self::empty`] and may have been filled before.
+    /// Reads the Gaussians of `range` into `part`, which must come from [`Self::empty`] and may have been filled before.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the range ends after the last Gaussian, [`Error::Format`] for damage that is
-    /// found only now, [`Error::Limit`] for a range too long to be held.
+    /// [`Error::Parameter`] if the range ends after the last Gaussian, [`Error::Format`] for damage that is found only now,
+    /// [`Error::Limit`] for a range too long to be held in memory.
     fn read(&self, range: Range<usize>, part: &mut Splats) -> Result<()>;
 
-    /// The whole scene. A scene in memory is borrowed.
+    /// Returns the whole scene. A scene in memory is borrowed.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -64,7 +65,7 @@ pub trait SplatSource {
         Ok(Cow::Owned(splats))
     }
 
-    /// Appends the SH-rest of `gaussians`, which are in any order, to `out`.
+    /// Appends the SH-rest of each of `gaussians`, which may be in any order, to `out`.
     ///
     /// # Errors
     /// As [`Self::read`].

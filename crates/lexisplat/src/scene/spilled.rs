@@ -5,12 +5,12 @@ use crate::scene::splats::Geometry;
 use crate::support::error::Result;
 use crate::support::spill::{Spill, SpillTo, Spilled};
 
-/// The values of extras, spilled.
+/// Extras without values, each with its spilled values.
 #[derive(Debug)]
 pub(crate) struct SpilledExtras(Vec<(Extra, Spill)>);
 
 impl SpilledExtras {
-    /// No values yet of the extras of `empty`, which has no Gaussians.
+    /// Starts with no values of the extras of `empty`, which has no Gaussians.
     pub(crate) fn new(to: SpillTo<'_>, empty: Geometry) -> Result<Self> {
         empty.extras.into_iter().map(|extra| Ok((extra, Spill::new(to)?))).collect::<Result<_>>().map(Self)
     }
@@ -23,7 +23,7 @@ impl SpilledExtras {
         Ok(())
     }
 
-    /// The name and type of each extra, and its values.
+    /// Returns the name and type of each extra, and its spilled values.
     pub(crate) fn finish(self) -> Result<Vec<(Extra, Spilled)>> {
         self.0.into_iter().map(|(extra, spill)| Ok((extra, spill.finish()?))).collect()
     }

@@ -1,6 +1,6 @@
 //! Statistics of a scene's values, and warnings about them.
 //!
-//! The numbers behind `lexisplat info`. Sums are taken over fixed blocks of Gaussians and added in order, so the
+//! These are the numbers behind `lexisplat info`. Sums are taken over fixed blocks of Gaussians and added in order, so the
 //! result does not depend on the number of threads or on the parts in which a scene comes.
 
 use std::ops::Range;
@@ -11,25 +11,25 @@ use crate::scene::extra::for_extra;
 use crate::scene::splats::Splats;
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_vec};
 
-/// Lower edges of the bins of [`Lint::rest_norms`]; the last one is open above. The tolerances in
-/// use, 0.03 to 0.3, are edges: the bins below a tolerance hold the Gaussians that need no atom at all.
+/// Lower edges of the bins of [`Lint::rest_norms`]. The last bin is open above. The tolerances in use, 0.03 to 0.3, are
+/// edges, so that the bins below a tolerance hold the Gaussians that need no atom at all.
 pub const NORM_BINS: [f64; 9] = [0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
 
-/// A logarithmic scale above this is a standard deviation over 22,000 units. Trainers normalise scenes to a
-/// few units, so such a Gaussian is debris that covers the whole picture.
+/// Logarithmic scale above which a Gaussian is huge: its standard deviation is over 22,000 units. Trainers normalise scenes
+/// to a few units, so such a Gaussian is debris that covers the whole picture.
 pub const HUGE_LOG_SCALE: f32 = 10.0;
 
-/// `logit(1 / 255)`: below this opacity the INRIA rasteriser skips a Gaussian at its very centre
-/// (`forward.cu`, `alpha < 1.0f / 255.0f`).
+/// Opacity below which the INRIA rasteriser skips a Gaussian at its very centre (`forward.cu`, `alpha < 1.0f / 255.0f`). It
+/// is `logit(1 / 255)`.
 pub const NEVER_DRAWN_OPACITY: f32 = -5.537_334;
 
-/// Fewest Gaussians whose values tell whether they are activated already.
+/// Smallest number of Gaussians whose values tell whether they are activated already.
 const TELLING: u64 = 16;
 
-/// Largest difference from 1 of the length of a unit quaternion.
+/// Largest difference between 1 and the length of a quaternion that counts as unit.
 pub const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Range of one property over all Gaussians, without NaN.
+/// Range and mean of one property over all Gaussians, without NaN.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct AttributeStats {
@@ -47,24 +47,24 @@ pub struct AttributeStats {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Lint {
-    /// Gaussians in the scene.
+    /// Number of Gaussians in the scene.
     pub gaussians: u64,
-    /// Range of each property, in the order of the INRIA layout; extras last.
+    /// Range and mean of each property, in the order of the INRIA layout; extras last.
     pub attributes: Vec<AttributeStats>,
-    /// Gaussians whose SH-rest vector's L2 norm is in each bin of [`NORM_BINS`].
+    /// Number of Gaussians in each bin of [`NORM_BINS`], by the L2 norm of the SH-rest vector.
     pub rest_norms: [u64; NORM_BINS.len()],
     /// Mean L2 norm of the SH-rest vectors.
     pub mean_rest_norm: f64,
-    /// Gaussians whose SH-rest is all zero.
+    /// Number of Gaussians whose SH-rest is all zero.
     pub zero_rest: u64,
-    /// Quaternions of length 0, which have no direction to normalise.
+    /// Number of quaternions of length 0, which have no direction to normalise.
     pub zero_quaternions: u64,
-    /// Quaternions that are neither unit (within [`UNIT_TOLERANCE`]) nor zero. They are harmless, since renderers
-    /// normalise.
+    /// Number of quaternions that are neither unit (within [`UNIT_TOLERANCE`]) nor zero. Such quaternions are harmless,
+    /// since renderers normalise.
     pub non_unit_quaternions: u64,
-    /// Gaussians with a logarithmic scale over [`HUGE_LOG_SCALE`].
+    /// Number of Gaussians with a logarithmic scale over [`HUGE_LOG_SCALE`].
     pub huge_scales: u64,
-    /// Gaussians with an opacity below [`NEVER_DRAWN_OPACITY`].
+    /// Number of Gaussians with an opacity below [`NEVER_DRAWN_OPACITY`].
     pub never_drawn: u64,
     /// Warnings, one sentence each.
     pub warnings: Vec<String>,
@@ -80,7 +80,7 @@ pub fn lint(splats: &Splats) -> crate::Result<Lint> {
     Ok(linter.finish())
 }
 
-/// [`lint`] of a scene that comes part after part.
+/// The computation of [`lint`] for a scene that comes part after part.
 #[derive(Debug, Default)]
 pub struct Linter {
     gaussians: u64,
@@ -90,17 +90,19 @@ pub struct Linter {
     columns: Vec<(String, Blocks<Span>)>,
 }
 
-/// A sum of blocks of [`GAUSSIANS_PER_TASK`] Gaussians, which are added in order.
+/// A sum over Gaussians. Blocks of [`GAUSSIANS_PER_TASK`] Gaussians are summed by themselves, and their sums are added in
+/// order.
 #[derive(Debug, Clone, Default)]
 struct Blocks<T> {
-    /// Of all blocks that are full.
+    /// Sum of all blocks that are full.
     full: T,
-    /// Of the one that is not.
+    /// Sum of the last block, which is not full.
     open: T,
 }
 
 impl<T: Add + Default + Send + Sync> Blocks<T> {
-    /// Adds `len` Gaussians after the first `start`. `sum` adds those of a range of them to a sum.
+    /// Adds `len` Gaussians, of which the first has number `start` in the scene. `sum` adds the Gaussians of a range, which
+    /// counts from `start`, to a sum.
     fn add(&mut self, start: u64, len: usize, sum: impl Fn(Range<usize>, T) -> T + Sync) {
         let before = usize::try_from(start % GAUSSIANS_PER_TASK as u64).unwrap_or(0);
         let mut open = Some(std::mem::take(&mut self.open));
@@ -117,22 +119,22 @@ impl<T: Add + Default + Send + Sync> Blocks<T> {
         }
     }
 
-    /// The sum of all blocks.
+    /// Returns the sum of all blocks.
     fn finish(mut self) -> T {
         self.full.add(&self.open);
         self.full
     }
 }
 
-/// What blocks are sums of.
+/// A quantity that is summed over blocks.
 trait Add {
     /// Adds the sum of the next block.
     fn add(&mut self, next: &Self);
 }
 
 impl Linter {
-    /// Adds the next Gaussians. All parts are of one scene and have the same properties. The result does not
-    /// depend on the parts, down to the bit.
+    /// Adds the next Gaussians. All parts must be of one scene and have the same properties. The bits of the result do not
+    /// depend on how the scene is cut into parts.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] if the part's arrays differ in length.
@@ -143,7 +145,7 @@ impl Linter {
         self.gaussians += len as u64;
         self.view_dependent = splats.degree.get() > 0;
         let columns = columns(splats);
-        // An empty part may lack properties that the others have.
+        // An empty part may lack properties that other parts have.
         if start == 0 && self.columns.len() <= columns.len() {
             self.columns = columns.iter().map(|(name, _)| (name.clone(), Blocks::default())).collect();
         }
@@ -153,7 +155,7 @@ impl Linter {
         Ok(())
     }
 
-    /// The statistics of all parts together.
+    /// Returns the statistics of all parts together.
     #[must_use]
     pub fn finish(self) -> Lint {
         let (n, counts) = (self.gaussians, self.counts.finish());
@@ -203,8 +205,9 @@ fn warnings(lint: &Lint, view_dependent: bool) -> Vec<String> {
     out
 }
 
-/// Warnings that values look as if the exponential and the sigmoid had been taken of them, which renderers do once more. Of
-/// logits about half are negative, and of logarithms of sizes those of all Gaussians smaller than a unit.
+/// Returns warnings about opacities that look as if their sigmoid had been taken already, and about scales that look as if
+/// their exponential had. Renderers would take both once more. About half of all logits are negative, and so are the
+/// logarithms of all sizes below one unit.
 fn activated(lint: &Lint) -> Vec<String> {
     let of = |name: &str| lint.attributes.iter().find(|a| a.name == name);
     let scales: Vec<_> = ["scale_0", "scale_1", "scale_2"].iter().filter_map(|name| of(name)).collect();
@@ -219,7 +222,8 @@ fn activated(lint: &Lint) -> Vec<String> {
                 .to_owned(),
         );
     }
-    // Logarithms of sizes from 1 to e units on average, and of none below 1, would be a scene of boulders.
+    // If these values were logarithms, no size would be below 1 unit, and the geometric mean of the sizes would be below e
+    // units. That would be a scene of boulders.
     if !scales.is_empty() && scales.iter().all(|a| a.min > 0.0 && a.mean < 1.0) {
         out.push(
             "All scales are above 0 and small: they look as if they were activated already. A PLY holds logarithms of sizes, whose \
@@ -240,7 +244,7 @@ struct Counts {
 }
 
 impl Counts {
-    /// These, and those of `range`.
+    /// Returns these counts plus the counts of the Gaussians of `range`.
     fn and(mut self, splats: &Splats, range: Range<usize>) -> Self {
         let norm = |values: &[f32]| values.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt();
         let counts = &mut self;
@@ -248,7 +252,7 @@ impl Counts {
         for i in range {
             let rest = splats.rest(i);
             let length = norm(rest);
-            // NaN falls into the first bin.
+            // A NaN length falls into the first bin.
             let bin = NORM_BINS.iter().rposition(|&edge| length >= edge).unwrap_or(0);
             counts.rest_norms[bin] += 1;
             counts.norm_sum += length;
@@ -307,10 +311,10 @@ impl Span {
     }
 }
 
-/// Adds the values of some Gaussians to a span.
+/// A function that adds the values of some Gaussians to a span.
 type Sum<'a> = Box<dyn Fn(Range<usize>, Span) -> Span + Sync + 'a>;
 
-/// All properties of a scene.
+/// Returns all properties of a scene: for each its name, and a function that sums its values.
 fn columns(splats: &Splats) -> Vec<(String, Sum<'_>)> {
     let (geometry, dim) = (&splats.geometry, splats.degree.rest());
     let mut out = of_rows(&["x", "y", "z"], geometry.positions.as_flattened());
@@ -332,13 +336,13 @@ fn columns(splats: &Splats) -> Vec<(String, Sum<'_>)> {
     out
 }
 
-/// The columns of rows of values.
+/// Returns the properties in the columns of `values`. Each row has one value for each of `names`.
 fn of_rows<'a>(names: &[&str], values: &'a [f32]) -> Vec<(String, Sum<'a>)> {
     let column = |(column, name): (usize, &&str)| ((*name).to_owned(), every(values, column, names.len()));
     names.iter().enumerate().map(column).collect()
 }
 
-/// Every `width`-th value from `column` on.
+/// Returns a function that sums every `width`-th value from `column` on, except NaN.
 fn every<T: Copy + Into<f64> + Sync>(values: &[T], column: usize, width: usize) -> Sum<'_> {
     Box::new(move |rows, mut span| {
         for row in rows {
@@ -374,7 +378,7 @@ mod tests {
 
     #[test]
     fn each_oddity_is_counted_once() {
-        // Several chunks, oddities in the last.
+        // The scene has several chunks, with oddities in the last chunk.
         let n = 2 * GAUSSIANS_PER_TASK + 10;
         let mut s = scene(n);
         s.geometry.rotations[n - 1] = [0.0; 4];

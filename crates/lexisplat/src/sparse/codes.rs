@@ -336,31 +336,31 @@ impl SparseCodes {
         self.counts.is_empty()
     }
 
-    /// Nonzeros of all Gaussians together.
+    /// Returns the number of nonzeros of all Gaussians together.
     #[must_use]
     pub fn nonzeros(&self) -> usize {
         self.indices.len()
     }
 
-    /// Nonzeros of each Gaussian; 0 for an escape.
+    /// Returns the number of nonzeros of each Gaussian; 0 for an escape.
     #[must_use]
     pub fn counts(&self) -> &[u8] {
         &self.counts
     }
 
-    /// Atom numbers of all Gaussians, in order.
+    /// Returns the atom numbers of all Gaussians, in order.
     #[must_use]
     pub fn indices(&self) -> &Indices {
         &self.indices
     }
 
-    /// Values of all Gaussians, in order.
+    /// Returns the values of all Gaussians, in order.
     #[must_use]
     pub fn values(&self) -> &Values {
         &self.values
     }
 
-    /// Bytes of memory that the codes take: counts, offsets, indices, values, escapes.
+    /// Returns the number of bytes of memory that the codes take: counts, offsets, indices, values and escapes.
     #[must_use]
     pub fn resident_bytes(&self) -> usize {
         self.counts.len()
@@ -370,18 +370,18 @@ impl SparseCodes {
             + size_of_val(self.escapes.rows.as_slice())
     }
 
-    /// Bytes of memory that the offsets of so many Gaussians take.
+    /// Returns the number of bytes of memory that the offsets of `gaussians` Gaussians take.
     pub(crate) fn checkpoint_bytes(gaussians: usize) -> usize {
         gaussians.div_ceil(GAUSSIANS_PER_CHECKPOINT) * size_of::<u64>()
     }
 
-    /// The Gaussians stored exactly.
+    /// Returns the Gaussians that are stored exactly.
     #[must_use]
     pub fn escapes(&self) -> &Escapes {
         &self.escapes
     }
 
-    /// The stored form of Gaussian `i`.
+    /// Returns the stored form of Gaussian `i`.
     ///
     /// # Panics
     /// If `i` is not below [`Self::len`].
@@ -403,7 +403,7 @@ impl SparseCodes {
         CodedRest::Code(Column { codes: self, start, len })
     }
 
-    /// Writes the SH-rest of Gaussian `i` into `out`: exactly the values of the decompressed scene.
+    /// Writes the SH-rest of Gaussian `i` into `out`. The values are exactly those of the decompressed scene.
     ///
     /// # Panics
     /// If `i` is out of range or `out` is not `dictionary.dim()` long.
@@ -415,7 +415,8 @@ impl SparseCodes {
     }
 }
 
-/// Sums `value * atom` in the order given, with one f32 multiplication and one f32 addition at a time.
+/// Writes the sum of `value * atom` over the pairs of `code` into `out`. Terms are added in the order given, with one f32
+/// multiplication and one f32 addition at a time.
 ///
 /// This order and rounding are part of the promise: the encoder verifies exactly these values.
 #[inline]

@@ -1,7 +1,7 @@
 //! Builder methods of option structs.
 
-/// Defines public methods `$with(value)`, each of which sets the field `$field`. A `value` converts to the type of the
-/// field, so that an option takes a value as it is.
+/// Defines public methods `$with(value)`, each of which sets the field `$field`. `value` is converted to the type of the
+/// field, so that a field that is an `Option` takes a plain value.
 macro_rules! builder_methods {
     ($($with:ident($field:ident: $type:ty)),* $(,)?) => {$(
         #[doc = concat!("Sets [`Self::", stringify!($field), "`].")]

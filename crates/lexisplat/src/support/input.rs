@@ -23,7 +23,7 @@ enum Bytes {
     /// Pages of the file itself, which do not count as anonymous memory.
     #[cfg(feature = "mmap")]
     Mapped(memmap2::Mmap),
-    /// A copy: of pipes, of empty files, and in builds without `mmap`.
+    /// A copy of the bytes: for pipes, for empty files, and in builds without `mmap`.
     Owned(Vec<u8>),
 }
 
@@ -36,7 +36,7 @@ impl Input {
         Self::open_within(path, &Limits::default())
     }
 
-    /// [`Self::open`] that reads at most [`Limits::bytes`] of a file that cannot be mapped.
+    /// Opens `path` as [`Self::open`] does, but reads at most [`Limits::bytes`] of a file that cannot be mapped.
     ///
     /// # Errors
     /// [`Error::Io`] that names `path`, also if it is a folder. [`Error::Limit`] if the file is longer.
@@ -59,13 +59,13 @@ impl Input {
         Self::read(&name, file, limits)
     }
 
-    /// Reads `reader` to its end. Errors call it `name`.
+    /// Reads `reader` to its end. `name` is its name in errors.
     ///
     /// # Errors
-    /// [`Error::Io`] that names `name`, [`Error::Limit`] if there are more than [`Limits::bytes`].
+    /// [`Error::Io`] that names `name`, [`Error::Limit`] if there are more bytes than [`Limits::bytes`].
     pub fn read(name: &str, reader: impl Read, limits: &Limits) -> Result<Self> {
         let mut bytes = Vec::new();
-        // One byte over the limit tells a file that is too long from one that just fits.
+        // One byte over the limit tells a file that is too long from a file that just fits.
         reader
             .take(limits.bytes.saturating_add(1))
             .read_to_end(&mut bytes)

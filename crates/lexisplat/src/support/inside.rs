@@ -1,17 +1,17 @@
 //! Files that a file names.
 //!
-//! A scene of several files, a data set or a list comes from anybody, and so do the names and the links in it. What it names
-//! is read only if it is a regular file inside of the folder that the user named: a link could lead to a private file, to a
-//! pipe, which is waited for without end, or to a device, which gives bytes without end.
+//! A scene of several files, a data set or a list comes from anybody, and so do the names and the links in it. A named file
+//! is read only if it is a regular file inside of the folder that the user named. A link could otherwise lead to a private
+//! file, to a pipe, which is waited for without end, or to a device, which gives bytes without end.
 
 use std::path::{Path, PathBuf};
 
 use crate::support::error::{Error, Result};
 
-/// Where `name` of the folder `folder` is, links resolved. It may be a file or a folder.
+/// Returns the path of `name` in the folder `folder`, with links resolved. It may be a file or a folder.
 ///
 /// # Errors
-/// [`Error::Io`] if it is not there, [`Error::Format`] if it is not inside of `folder`. Both name the path.
+/// [`Error::Io`] if there is no such path, [`Error::Format`] if it is not inside of `folder`. Both name the path.
 pub fn inside(folder: &Path, name: impl AsRef<Path>) -> Result<PathBuf> {
     let path = folder.join(name);
     let found = path.canonicalize().map_err(|e| Error::io(&path, e))?;
@@ -27,10 +27,10 @@ pub fn inside(folder: &Path, name: impl AsRef<Path>) -> Result<PathBuf> {
     Err(Error::malformed(path.display().to_string(), problem))
 }
 
-/// [`inside`] of a regular file of at most `most` bytes.
+/// Returns the path as [`inside`] does, for a regular file of at most `most` bytes.
 ///
 /// # Errors
-/// As [`inside`], [`Error::Format`] for what is no regular file, and [`Error::Limit`] for one that is longer.
+/// As [`inside`], [`Error::Format`] if the path is not a regular file, and [`Error::Limit`] if the file is longer.
 pub fn file_inside(folder: &Path, name: impl AsRef<Path>, most: u64) -> Result<PathBuf> {
     let path = folder.join(name.as_ref());
     let found = inside(folder, name)?;
@@ -80,7 +80,7 @@ mod tests {
             assert!(found("part", 9).unwrap_err().to_string().contains("regular file"));
             assert!(matches!(found("none", 9), Err(Error::Io { .. })));
         }
-        // A device that is inside of the folder is none either.
+        // A device inside of the folder is not a regular file either.
         let said = file_inside(Path::new("/dev"), "zero", u64::MAX).unwrap_err().to_string();
         assert!(said.contains("regular file"), "{said}");
     }

@@ -9,44 +9,44 @@ fn rounded(x: f64) -> f32 {
     x as f32
 }
 
-/// 2 to the power `x`.
+/// Returns 2 to the power `x`.
 pub(crate) fn exp2(x: f32) -> f32 {
     rounded(libm::exp2(f64::from(x)))
 }
 
-/// e to the power `x`.
+/// Returns e to the power `x`.
 pub(crate) fn exp(x: f32) -> f32 {
     rounded(libm::exp(f64::from(x)))
 }
 
-/// Natural logarithm.
+/// Returns the natural logarithm of `x`.
 pub(crate) fn ln(x: f32) -> f32 {
     rounded(libm::log(f64::from(x)))
 }
 
-/// Binary logarithm.
+/// Returns the binary logarithm of `x`.
 pub(crate) fn log2(x: f32) -> f32 {
     rounded(libm::log2(f64::from(x)))
 }
 
-/// The angle of the point (x, y).
+/// Returns the angle of the point (x, y).
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {
     rounded(libm::atan2(f64::from(y), f64::from(x)))
 }
 
-/// ln(sigmoid(x)): the logarithm of an opacity, from what a trainer stores.
+/// Returns `ln(sigmoid(x))`: the logarithm of an opacity, from the number that a trainer stores.
 pub(crate) fn log_sigmoid(x: f32) -> f32 {
     let x = f64::from(x);
     rounded(x.min(0.0) - libm::log1p(libm::exp(-x.abs())))
 }
 
-/// Inverse of [`log_sigmoid`], for arguments below 0.
+/// Returns the inverse of [`log_sigmoid`] at `x`, which must be below 0.
 pub(crate) fn logit_of_log(x: f32) -> f32 {
     let x = f64::from(x);
     rounded(x - libm::log(-libm::expm1(x)))
 }
 
-/// The value below which `share` of the values in `sorted` lie; 0 if `sorted` is empty.
+/// Returns the value below which `share` of the values in `sorted` lie; 0 if `sorted` is empty.
 pub(crate) fn at_share<T: Copy + Default>(sorted: &[T], share: f64) -> T {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
     let index = ((sorted.len().max(1) - 1) as f64 * share) as usize;
@@ -67,14 +67,15 @@ pub(crate) fn scaled(a: Vec3, s: f32) -> Vec3 {
     a.map(|v| v * s)
 }
 
-/// The axes from longest to shortest. Equally long axes keep their order.
+/// Returns the axes from longest to shortest. Equally long axes keep their order.
 pub(crate) fn longest_first(scales: Vec3) -> [usize; 3] {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
     order
 }
 
-/// Columns of the rotation that a quaternion (w, x, y, z) of any length means. Zero means the identity.
+/// Returns the columns of the rotation that a quaternion (w, x, y, z) of any length stands for. A quaternion of length 0
+/// stands for the identity.
 pub(crate) fn columns(q: [f32; 4]) -> [Vec3; 3] {
     let length = q.iter().map(|v| v * v).sum::<f32>().sqrt();
     if length.is_nan() || length < 1e-12 {
@@ -88,8 +89,8 @@ pub(crate) fn columns(q: [f32; 4]) -> [Vec3; 3] {
     ]
 }
 
-/// Maps a unit vector and its opposite to one point of the square from -1 to 1: the upper half of an octahedron,
-/// flattened and turned by 45 degrees.
+/// Returns the point of the square from -1 to 1 that stands for the unit vector `u` and its opposite. The square is the
+/// upper half of an octahedron, flattened and turned by 45 degrees.
 pub(crate) fn square_of_axis(u: Vec3) -> [f32; 2] {
     let u = if u[2] < 0.0 { scaled(u, -1.0) } else { u };
     let sum = u[0].abs() + u[1].abs() + u[2];
@@ -97,7 +98,8 @@ pub(crate) fn square_of_axis(u: Vec3) -> [f32; 2] {
     [x + y, x - y]
 }
 
-/// What a number is called that is not finite. Where only such numbers are told, nothing that writes others is needed.
+/// Returns the name of a number that is not finite. Messages that name only such numbers need no code that writes other
+/// numbers.
 pub(crate) fn name_of(not_finite: f32) -> &'static str {
     match not_finite {
         f32::INFINITY => "inf",
@@ -121,7 +123,7 @@ mod tests {
         for _ in 0..10_000 {
             let q: [f32; 4] = std::array::from_fn(|_| random(&mut rng));
             let r = columns(q);
-            // Columns make a right-handed frame; their trace and what is not symmetric say which.
+            // The columns make a right-handed frame. Their trace and their antisymmetric part tell which frame it is.
             for k in 0..3 {
                 let across = cross(r[k], r[(k + 1) % 3]);
                 assert!(dot(across, r[(k + 2) % 3]) > 0.9999 && dot(r[k], r[(k + 1) % 3]).abs() < 1e-5);

@@ -1,4 +1,4 @@
-//! What all other modules use: errors, limits, input and output, threads, vector instructions.
+//! Support for all other modules: errors, limits, input and output, threads, vector instructions.
 
 pub(crate) mod builder;
 pub(crate) mod crc32;

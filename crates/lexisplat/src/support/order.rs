@@ -1,11 +1,11 @@
-//! The order of things that are sorted once a file.
+//! The sorting of lists that are sorted once for each file.
 
 use std::cmp::Ordering;
 
-/// The numbers below `n`, sorted by `compare`. Those that compare equal stay in order.
+/// Returns the numbers below `n`, sorted by `compare`. Numbers that compare equal stay in order.
 ///
-/// It merges runs. It is not generic and much smaller than the sorts of the standard library, which are made for every type
-/// anew: in WebAssembly that matters more than time does here.
+/// The function merges runs. It is not generic, and its code is much smaller than the sorts of the standard library, which
+/// are compiled anew for every type. In WebAssembly, this size matters more than the time that sorting takes here.
 pub(crate) fn order(n: usize, compare: &mut dyn FnMut(usize, usize) -> Ordering) -> Vec<usize> {
     let mut order: Vec<usize> = (0..n).collect();
     let mut merged = Vec::with_capacity(n);

@@ -6,17 +6,17 @@
 
 use std::ops::Range;
 
-/// Gaussians that one task handles: enough to hide the cost of a task, few enough to balance the threads.
+/// Number of Gaussians that one task handles: enough to hide the cost of a task, few enough to balance the threads.
 pub(crate) const GAUSSIANS_PER_TASK: usize = 2048;
-/// Gaussians that are read or coded at once. It bounds the values that are in memory twice.
+/// Number of Gaussians that are read or coded at once. It bounds the values that are in memory twice.
 pub(crate) const AT_ONCE: usize = 32 * GAUSSIANS_PER_TASK;
 
-/// Calls `f` with consecutive ranges of at most `chunk` that cover `0..len`; results in order.
+/// Calls `f` with consecutive ranges of at most `chunk` numbers that cover `0..len`, and returns the results in order.
 pub(crate) fn map_chunks<T: Send>(len: usize, chunk: usize, f: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     map_vec((0..len).step_by(chunk).collect(), |start| f(start..len.min(start.saturating_add(chunk))))
 }
 
-/// Calls `f(chunk number, chunk)` for consecutive pieces of `values`.
+/// Calls `f(chunk number, chunk)` for consecutive chunks of at most `chunk` of `values`.
 pub(crate) fn for_each_chunk_mut<T: Send>(
     values: &mut [T],
     chunk: usize,
@@ -25,7 +25,7 @@ pub(crate) fn for_each_chunk_mut<T: Send>(
     map_vec(values.chunks_mut(chunk).enumerate().collect(), |(c, piece)| f(c, piece));
 }
 
-/// Calls `f` with each of `items`; results in order.
+/// Calls `f` with each of `items`, and returns the results in order.
 pub(crate) fn map_vec<T: Send, R: Send>(items: Vec<T>, f: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
     #[cfg(feature = "parallel")]
     {

@@ -4,21 +4,21 @@ use crate::support::error::{Error, Result};
 
 /// Receives progress from long work, and may cancel it. All methods may be called from worker threads.
 pub trait Progress: Sync {
-    /// A stage starts. It will do `total` units of work, or an unknown number if `total` is 0.
+    /// Is told that a stage starts. The stage has `total` units of work, or an unknown number if `total` is 0.
     fn begin(&self, stage: Stage, total: u64) {
         let _ = (stage, total);
     }
 
-    /// `units` more units of the current stage are done.
+    /// Is told that `units` more units of the current stage are done.
     fn advance(&self, units: u64) {
         let _ = units;
     }
 
-    /// The current stage is over.
+    /// Is told that the current stage is over.
     fn end(&self) {}
 
-    /// Whether the work is to end early. Work that finds `true` returns [`Error::Cancelled`] soon and leaves
-    /// no output. The answer must not become `false` again.
+    /// Returns whether the work is to end early. Work that finds `true` returns [`Error::Cancelled`] soon and leaves no
+    /// output. The answer must not become `false` again.
     fn is_cancelled(&self) -> bool {
         false
     }

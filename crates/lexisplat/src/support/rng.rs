@@ -40,10 +40,10 @@ impl SplitMix64 {
 
 /// Longest list that is always stored whole.
 const DENSE: usize = 1 << 20;
-/// A map of one in so many entries takes about as much memory as the whole list.
+/// A map with one entry for this many entries of the list takes about as much memory as the whole list.
 const SPARSE_SHARE: usize = 16;
 
-/// A list that Fisher and Yates shuffle. At first entry `i` is the number `i`.
+/// A list that is shuffled as by Fisher and Yates. At first, entry `i` is the number `i`.
 enum Shuffle {
     Whole(Vec<usize>),
     /// The entries that differ from their index, by index; and the length of the list.
@@ -84,7 +84,7 @@ impl Shuffle {
 mod tests {
     use super::*;
 
-    /// The shuffle with the whole list in memory.
+    /// Returns the first `drawn` numbers of the shuffle with the whole list in memory.
     fn naive(seed: u64, count: usize, drawn: usize) -> Vec<usize> {
         let mut random = SplitMix64::new(seed);
         let mut list: Vec<usize> = (0..count).collect();

@@ -41,7 +41,7 @@ impl Simd {
     /// The instructions that the target guarantees: SSE2 on `x86_64`, NEON on `aarch64`.
     pub const PLAIN: Self = Self(Set::Plain);
 
-    /// All sets that this CPU has, slowest first.
+    /// Returns all sets that this CPU has, slowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
         let all = std::iter::once(Set::Plain);
@@ -51,7 +51,7 @@ impl Simd {
         all.map(Self).collect()
     }
 
-    /// The fastest set that this CPU has.
+    /// Returns the fastest set that this CPU has.
     #[must_use]
     pub fn widest() -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -64,13 +64,13 @@ impl Simd {
         Self::PLAIN
     }
 
-    /// The set called `name`, if this CPU has it.
+    /// Returns the set called `name`, if this CPU has it.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::available().into_iter().find(|simd| simd.name() == name)
     }
 
-    /// The name of the set: `plain`, `avx2` or `avx512`.
+    /// Returns the name of the set: `plain`, `avx2` or `avx512`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self.0 {
@@ -82,7 +82,7 @@ impl Simd {
         }
     }
 
-    /// This set with registers of at most 256 bits, which are faster between look-ups of single numbers.
+    /// Returns this set with registers of at most 256 bits, which are faster between look-ups of single numbers.
     pub(crate) fn narrow(self) -> Self {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
@@ -98,7 +98,7 @@ impl Simd {
         work()
     }
 
-    /// The set of the innermost [`Self::scope`]; outside of all scopes the widest.
+    /// Returns the set of the innermost [`Self::scope`]; outside of all scopes, the widest set.
     #[must_use]
     pub fn current() -> Self {
         CHOSEN.get().unwrap_or_else(Self::widest)
@@ -111,7 +111,7 @@ impl Simd {
         self.run(job)
     }
 
-    /// [`Self::dispatch`] of a job that is no closure.
+    /// Calls `job` as [`Self::dispatch`] does. `job` need not be a closure.
     #[inline(always)]
     pub(crate) fn run<J: pulp::NullaryFnOnce>(self, job: J) -> J::Output {
         match self.0 {

@@ -1,4 +1,4 @@
-//! Where the bytes of a result go.
+//! The target of the bytes of a result.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -7,12 +7,12 @@ use crate::support::error::{Error, Result};
 use crate::support::output::{Output, write_whole};
 use crate::support::progress::{Progress, Stage};
 
-/// Bytes passed on at a time; between two such blocks the work can be cancelled.
+/// Number of bytes passed on at a time. Between two such blocks, the work can be cancelled.
 const BLOCK: usize = 1 << 20;
 
-/// Where a result is written: a file that appears when it is whole, or any writer.
+/// The target of a result: a file that appears when it is whole, or any writer.
 ///
-/// Paths, [`Output`]s and mutable references to writers convert into it:
+/// Paths, [`Output`]s and mutable references to writers convert into a sink:
 ///
 /// ```
 /// # use lexisplat::Sink;
@@ -56,7 +56,8 @@ impl<'a, W: Write> From<&'a mut W> for Sink<'a> {
 }
 
 impl Sink<'_> {
-    /// The folder for temporary files as large as the result: that of the file, or the system's for a writer.
+    /// Returns the folder for temporary files as large as the result: the folder of the file, or the system's temporary
+    /// folder for a writer.
     pub(crate) fn spill_folder(&self) -> Result<PathBuf> {
         match &self.0 {
             Target::File(output) => output.spill_folder(),
@@ -64,7 +65,7 @@ impl Sink<'_> {
         }
     }
 
-    /// Writes `bytes` and returns their number. Reports [`Stage::Write`]. For writers of further formats.
+    /// Writes `bytes` and returns their number. Reports [`Stage::Write`]. The method is for writers of further formats.
     ///
     /// # Errors
     /// [`Error::Io`] or [`Error::Writer`], and [`Error::Cancelled`] if `progress` asks for it.
@@ -72,8 +73,8 @@ impl Sink<'_> {
         self.write(bytes.len() as u64, progress, |writer, refused| writer.write_all(bytes).map_err(refused))
     }
 
-    /// Lets `fill` write all of the `bytes` bytes of a result, and returns their number. The second argument of
-    /// `fill` makes an [`Error`] of an error of the writer.
+    /// Lets `fill` write all of the `bytes` bytes of a result, and returns their number. The second argument of `fill`
+    /// turns an error of the writer into an [`Error`].
     ///
     /// Reports [`Stage::Write`], and ends with [`Error::Cancelled`] if `progress` asks for it.
     pub(crate) fn write(
@@ -101,7 +102,7 @@ impl Sink<'_> {
     }
 }
 
-/// Counts the bytes that pass.
+/// A writer that counts the bytes that pass through it, reports them as progress and can be cancelled.
 struct Counted<'a> {
     writer: &'a mut dyn Write,
     progress: &'a dyn Progress,

@@ -1,6 +1,6 @@
-//! Bytes that are made before the file they belong to can be written: kept in memory or in a temporary file.
+//! Bytes that are made before their file can be written. They are kept in memory or in a temporary file.
 //!
-//! Temporary files have no name where the system allows that, so nothing is left however the process ends.
+//! Temporary files have no name where the system allows that, so no file is left however the process ends.
 
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -10,10 +10,10 @@ use tempfile::SpooledTempFile;
 use crate::support::crc32;
 use crate::support::error::{Error, Result};
 
-/// Bytes of the write buffer, and of what is copied at a time.
+/// Number of bytes of the write buffer, and of a block that is copied at a time.
 const BUFFER: usize = 1 << 18;
 
-/// Where spilled bytes are kept.
+/// The place where spilled bytes are kept.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum SpillTo<'a> {
     Memory,
@@ -21,11 +21,11 @@ pub(crate) enum SpillTo<'a> {
     Folder(&'a Path),
 }
 
-/// Memory or a temporary file.
+/// Bytes in memory or in a temporary file.
 #[derive(Debug)]
 pub(crate) struct Temporary {
     file: SpooledTempFile,
-    /// The folder, or `memory`.
+    /// The folder of the file, or `memory`.
     name: PathBuf,
 }
 
@@ -41,14 +41,14 @@ impl Temporary {
         Ok(Self { file, name })
     }
 
-    /// Appends `bytes`, and returns where they start.
+    /// Appends `bytes`, and returns the position at which they start.
     pub(crate) fn append(&mut self, bytes: &[u8]) -> Result<u64> {
         let start = self.file.seek(SeekFrom::End(0));
         let start = start.and_then(|start| self.file.write_all(bytes).map(|()| start));
         start.map_err(|e| Error::temporary_file(&self.name, e))
     }
 
-    /// Fills `bytes` from `start` on.
+    /// Fills `bytes` with the bytes from position `start` on.
     pub(crate) fn read_at(&mut self, start: u64, bytes: &mut [u8]) -> Result<()> {
         let read = self.file.seek(SeekFrom::Start(start)).and_then(|_| self.file.read_exact(bytes));
         read.map_err(|e| Error::temporary_file(&self.name, e))
@@ -64,7 +64,7 @@ pub(crate) struct Spill {
 }
 
 impl Spill {
-    /// An empty one.
+    /// Creates a spill without bytes.
     pub(crate) fn new(to: SpillTo<'_>) -> Result<Self> {
         let Temporary { file, name } = Temporary::new(to)?;
         let file = BufWriter::with_capacity(BUFFER, file);
@@ -78,7 +78,7 @@ impl Spill {
         self.file.write_all(bytes).map_err(|e| Error::temporary_file(&self.name, e))
     }
 
-    /// All of it, to be read from the start.
+    /// Returns all spilled bytes, to be read from the start.
     pub(crate) fn finish(self) -> Result<Spilled> {
         let Self { file, name, checksum } = self;
         let file = file.into_inner().map_err(|e| e.into_error());
@@ -93,12 +93,12 @@ impl Spill {
 #[derive(Debug)]
 pub(crate) struct Spilled {
     file: Temporary,
-    /// CRC-32.
+    /// CRC-32 of all bytes.
     pub(crate) checksum: u32,
 }
 
 impl Spilled {
-    /// The next `count` values.
+    /// Returns the next `count` values.
     pub(crate) fn take<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
         &mut self,
         count: usize,
@@ -109,7 +109,7 @@ impl Spilled {
         Ok(values)
     }
 
-    /// Copies them to `writer`.
+    /// Copies the bytes that were not taken to `writer`.
     pub(crate) fn copy_to(self, writer: &mut dyn Write) -> io::Result<()> {
         let Temporary { mut file, name } = self.file;
         let mut block = vec![0; BUFFER];
@@ -124,11 +124,11 @@ impl Spilled {
     }
 }
 
-/// Spilled bytes that are read in pieces, in an order of their own.
+/// Spilled bytes that are read piece by piece, in the order of a list of pieces.
 #[derive(Debug)]
 pub(crate) struct Woven {
     spilled: Spilled,
-    /// Where each piece starts, and its length.
+    /// Start and length of each piece.
     pieces: Vec<(u64, usize)>,
 }
 
@@ -137,12 +137,12 @@ impl Woven {
         Self { spilled, pieces }
     }
 
-    /// Number of all bytes.
+    /// Returns the number of bytes of all pieces.
     pub(crate) fn len(&self) -> usize {
         self.pieces.iter().map(|piece| piece.1).sum()
     }
 
-    /// All bytes.
+    /// Returns the bytes of all pieces.
     pub(crate) fn into_bytes(self) -> Result<Vec<u8>> {
         let mut bytes = Vec::with_capacity(self.len());
         for piece in self.into_pieces() {
@@ -151,7 +151,7 @@ impl Woven {
         Ok(bytes)
     }
 
-    /// Copies them to `writer`.
+    /// Copies the bytes of all pieces to `writer`.
     pub(crate) fn copy_to(self, writer: &mut dyn Write) -> io::Result<()> {
         for piece in self.into_pieces() {
             writer.write_all(&piece.map_err(io::Error::other)?)?;

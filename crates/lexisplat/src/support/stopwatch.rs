@@ -1,6 +1,6 @@
 //! Elapsed time, on platforms with a clock.
 
-/// Measures the time since it was started.
+/// A measurement of the time since its start.
 #[derive(Debug, Clone, Copy)]
 pub struct Stopwatch {
     #[cfg(not(target_family = "wasm"))]
@@ -17,7 +17,7 @@ impl Stopwatch {
         }
     }
 
-    /// Seconds since the start. In a browser, where `Instant` would panic, it is 0.
+    /// Returns the seconds since the start; 0 in a browser, where `Instant` would panic.
     #[cfg_attr(target_family = "wasm", expect(clippy::unused_self, reason = "there is no clock"))]
     #[must_use]
     pub fn seconds(self) -> f64 {

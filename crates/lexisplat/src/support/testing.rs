@@ -4,14 +4,14 @@ use crate::scene::sh::ShDegree;
 use crate::scene::splats::{Geometry, SceneMeta, Splats};
 use crate::support::rng::SplitMix64;
 
-/// Values of a Gaussian without SH-rest.
+/// Number of values of a Gaussian without SH-rest.
 const VALUES: usize = 14;
-/// Directions in which SH-rest vectors lie, so that a dictionary has something to find.
+/// Number of directions in which SH-rest vectors lie, so that a dictionary has directions to find.
 const DIRECTIONS: usize = 12;
 /// Number of different random values.
 const FINE: usize = 1 << 20;
 
-/// `gaussians` Gaussians of SH degree 3 in a cube of side 2, the same for the same `seed`.
+/// Returns `gaussians` Gaussians of SH degree 3 in a cube of side 2. The same `seed` gives the same scene.
 #[expect(clippy::cast_possible_truncation, reason = "test values are f32")]
 pub(crate) fn scene(gaussians: usize, seed: u64) -> Splats {
     let mut random = SplitMix64::new(seed);

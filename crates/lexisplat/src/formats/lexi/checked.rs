@@ -18,22 +18,22 @@ pub(super) type FileBytes<'a> = Box<dyn AsRef<[u8]> + Send + Sync + 'a>;
 
 /// A safetensors file whose header is parsed and whose checksums hold.
 pub(super) struct Checked<'a> {
-    /// The file, as the caller named it.
+    /// Name of the file, as the caller gave it.
     pub(super) file: String,
     bytes: FileBytes<'a>,
-    /// Where the data of tensors start.
+    /// Position at which the data of tensors start.
     data_start: usize,
     header: Header,
-    /// Length of the file by its header.
+    /// Length of the file according to its header.
     pub(super) file_bytes: u64,
 }
 
-/// How much of a file there may be.
+/// The part of a file that must be there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Extent {
-    /// All of it.
+    /// All bytes of the file.
     Whole,
-    /// Its first bytes, if it is packed.
+    /// A first part of the file, which must be packed.
     First,
 }
 
@@ -47,8 +47,8 @@ impl std::fmt::Debug for Checked<'_> {
 }
 
 impl<'a> Checked<'a> {
-    /// Parses `shared` and verifies everything that does not depend on the meaning of tensors. The value of
-    /// the metadata key `format` is one of `formats`.
+    /// Parses `shared` and verifies everything that does not depend on the meaning of tensors. The value of the metadata
+    /// key `format` must be one of `formats`.
     pub(super) fn open(
         file: String,
         shared: FileBytes<'a>,
@@ -119,7 +119,7 @@ impl<'a> Checked<'a> {
     }
 
     fn verify_tensors(&self) -> Result<()> {
-        // The ranges of packed data have checksums of their own, so that a part of it can be checked.
+        // The ranges of packed data have checksums of their own, so that a part of the data can be checked.
         let (packed, elsewhere): (bool, &[&str]) = match self.is_packed() && self.has(tensor::HEAD) {
             true => (true, &[tensor::HEAD, tensor::DATA]),
             false => (false, &[tensor::HEADER_CHECKSUM]),
@@ -156,7 +156,7 @@ impl<'a> Checked<'a> {
         Ok(())
     }
 
-    /// The checksum of the header and of the head of a packed file, and the bytes of the head.
+    /// Returns the checksum of the header and of the head of a packed file, and the bytes of the head.
     pub(super) fn sealed_head(&self) -> Result<(u32, &[u8])> {
         let len = self.list_len(tensor::HEAD)?;
         let bytes = self.data(tensor::HEAD, Dtype::U8, &[len])?;
@@ -170,19 +170,20 @@ impl<'a> Checked<'a> {
         Error::malformed(&self.file, text)
     }
 
-    /// Whether all bytes of the file are there.
+    /// Returns whether all bytes of the file are there.
     pub(super) fn is_whole(&self) -> bool {
         self.bytes().len() as u64 == self.file_bytes
     }
 
-    /// Whether all bytes of the tensor `name` are there.
+    /// Returns whether all bytes of the tensor `name` are there.
     fn is_there(&self, name: &str) -> bool {
         self.header
             .info(name)
             .is_some_and(|tensor| tensor.data_offsets.1 <= self.bytes().len() - self.data_start)
     }
 
-    /// Where the tensor `name` starts in the file, its length, and the first of its bytes, as many as are there.
+    /// Returns the position at which the tensor `name` starts in the file, its length, and its first bytes, as many as are
+    /// there.
     pub(super) fn first_of(&self, name: &str) -> Option<(u64, u64, &[u8])> {
         let (start, end) = self.header.info(name)?.data_offsets;
         let place = |offset: usize| self.data_start.saturating_add(offset);
@@ -194,12 +195,12 @@ impl<'a> Checked<'a> {
         self.header.info(name).is_some()
     }
 
-    /// The metadata entry `key`.
+    /// Returns the metadata entry `key`.
     pub(super) fn text(&self, key: &str) -> Result<&str> {
         self.header.text(key).ok_or_else(|| self.malformed(format!("metadata '{key}' is missing")))
     }
 
-    /// The metadata entry `key` as a number, or as `true` or `false`.
+    /// Returns the metadata entry `key` as a number, or as `true` or `false`.
     pub(super) fn number<T: std::str::FromStr>(&self, key: &str) -> Result<T> {
         let text = self.text(key)?;
         text.parse().ok().filter(|_| is_value(text)).ok_or_else(|| self.wrong_value(key, text))
@@ -210,17 +211,18 @@ impl<'a> Checked<'a> {
         self.malformed(format!("metadata '{key}' is '{text}'"))
     }
 
-    /// The metadata entry `key`, if it is there.
+    /// Returns the metadata entry `key` as a number, or as `true` or `false`; `None` if it is missing.
     pub(super) fn optional<T: std::str::FromStr>(&self, key: &str) -> Result<Option<T>> {
         self.has_text(key).then(|| self.number(key)).transpose()
     }
 
-    /// Whether the file is a packed one, in which many metadata entries may be missing.
+    /// Returns whether the file is packed. In packed files, many metadata entries may be missing.
     pub(super) fn is_packed(&self) -> bool {
         self.number::<u64>(key::VERSION).is_ok_and(|version| version == PACKED_VERSION)
     }
 
-    /// The metadata entry `key` as a number, or as `true` or `false`; its default if it is missing and may be.
+    /// Returns the metadata entry `key` as a number, or as `true` or `false`. In packed files, a missing entry has its
+    /// default.
     pub(super) fn number_or_default<T: std::str::FromStr + Default>(&self, key: &str) -> Result<T> {
         match self.is_packed() {
             true => Ok(self.optional(key)?.unwrap_or_default()),
@@ -228,12 +230,13 @@ impl<'a> Checked<'a> {
         }
     }
 
-    /// Whether there is a metadata entry `key`.
+    /// Returns whether there is a metadata entry `key`.
     pub(super) fn has_text(&self, key: &str) -> bool {
         self.header.text(key).is_some()
     }
 
-    /// What `take` makes of the JSON in the metadata entry `key`, if it is what was to be there.
+    /// Returns the result of `take` for the JSON in the metadata entry `key`. If `take` returns `None`, the entry is
+    /// malformed.
     pub(super) fn json<T>(&self, key: &str, take: impl FnOnce(&Json) -> Option<T>) -> Result<T> {
         let parsed = Json::parse(self.text(key)?.as_bytes());
         let taken =
@@ -241,17 +244,17 @@ impl<'a> Checked<'a> {
         taken.map_err(|error| self.malformed(format!("metadata '{key}': {error}")))
     }
 
-    /// Names of all tensors, sorted.
+    /// Returns the names of all tensors, sorted.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.header.names()
     }
 
-    /// The same in the order in which the tensors lie.
+    /// Returns the names of all tensors, in the order in which the tensors lie.
     pub(super) fn names_by_place(&self) -> Vec<&str> {
         self.header.by_place().into_iter().map(|(name, _)| name.as_str()).collect()
     }
 
-    /// All bytes of the file.
+    /// Returns all bytes of the file that are there.
     pub(super) fn bytes(&self) -> &[u8] {
         (*self.bytes).as_ref()
     }
@@ -268,7 +271,7 @@ impl<'a> Checked<'a> {
         Ok(TensorView { dtype: *dtype, shape, data })
     }
 
-    /// The length of the tensor `name`, which must have one dimension.
+    /// Returns the length of the tensor `name`, which must have one dimension.
     pub(super) fn list_len(&self, name: &str) -> Result<usize> {
         match self.view(name)?.shape {
             [len] => Ok(*len),
@@ -287,7 +290,7 @@ impl<'a> Checked<'a> {
         }
     }
 
-    /// The bytes of the tensor `name`, which must have this type and shape.
+    /// Returns the bytes of the tensor `name`, which must have this type and shape.
     pub(super) fn data(&self, name: &str, dtype: Dtype, shape: &[usize]) -> Result<&[u8]> {
         let view = self.view(name)?;
         if view.dtype != dtype || view.shape != shape {
@@ -298,7 +301,7 @@ impl<'a> Checked<'a> {
         Ok(view.data)
     }
 
-    /// A copy of the tensor `name`, which must have this type and shape.
+    /// Returns a copy of the tensor `name`, which must have this type and shape.
     pub(super) fn values<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
         &self,
         name: &str,
@@ -308,7 +311,7 @@ impl<'a> Checked<'a> {
         Ok(bytemuck::allocation::pod_collect_to_vec(self.data(name, dtype, shape)?))
     }
 
-    /// A copy of rows `range` of the tensor `name`, which must have this type and shape.
+    /// Returns a copy of rows `range` of the tensor `name`, which must have this type and shape.
     pub(super) fn part<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
         &self,
         name: &str,
@@ -323,12 +326,13 @@ impl<'a> Checked<'a> {
     }
 }
 
-/// Whether `text` is a number as JSON writes it, or `true` or `false`.
+/// Returns whether `text` is a number as JSON writes it, or `true` or `false`.
 fn is_value(text: &str) -> bool {
     json::is_number(text) || matches!(text, "true" | "false")
 }
 
-/// Where the header of a file ends that begins with `bytes`, by its length.
+/// Returns the position at which the header ends, in a file that begins with `bytes`. The length before the header gives
+/// it.
 pub(super) fn header_end(file: &str, bytes: &[u8], limits: &Limits) -> Result<u64> {
     let length = bytes.first_chunk::<LENGTH_BYTES>().ok_or_else(|| {
         let (what, found) = ("the header's length".to_owned(), bytes.len() as u64);
@@ -339,7 +343,8 @@ pub(super) fn header_end(file: &str, bytes: &[u8], limits: &Limits) -> Result<u6
     Ok(length.saturating_add(LENGTH_BYTES as u64))
 }
 
-/// Where the tensors end that are needed before any data, in a file whose header ends at `header_end`.
+/// Returns the position at which the last tensor ends that is needed before any data, in a file whose header ends at
+/// `header_end`.
 pub(super) fn start_end(file: &str, bytes: &[u8], header_end: u64) -> Result<u64> {
     let header = usize::try_from(header_end).ok().and_then(|end| bytes.get(..end)).unwrap_or_default();
     let header = read_header(file, header)?;
@@ -347,7 +352,7 @@ pub(super) fn start_end(file: &str, bytes: &[u8], header_end: u64) -> Result<u64
     Ok(header_end.saturating_add(end(tensor::HEADER_CHECKSUM).max(end(tensor::HEAD))))
 }
 
-/// The header, which is `bytes` with its length before it.
+/// Reads the header from `bytes`, which begin with its length.
 fn read_header(file: &str, bytes: &[u8]) -> Result<Header> {
     Header::read(bytes.get(LENGTH_BYTES..).unwrap_or_default()).map_err(|e| Error::malformed(file, e))
 }

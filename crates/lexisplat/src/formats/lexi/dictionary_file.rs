@@ -23,7 +23,7 @@ use crate::support::sink::Sink;
 /// Reads the dictionary of a dictionary file or of a .lexi scene.
 ///
 /// # Errors
-/// As [`super::read()`]; a scene of degree 0 has none.
+/// As [`super::read()`]. [`Error::Format`] also for a scene of degree 0, which has no dictionary.
 pub fn read_dictionary(path: &Path, limits: &Limits) -> Result<Dictionary> {
     let bytes = Input::open_within(path, limits)?;
     read_dictionary_bytes(&path.display().to_string(), &bytes, limits)

@@ -19,7 +19,7 @@ use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 
-/// Gaussians between two offsets into the codes that are kept. Opening a file reads as many at a time.
+/// Number of Gaussians between two offsets into the codes that are kept. Opening a file reads as many Gaussians at a time.
 const BLOCK: usize = 65_536;
 
 /// An exact file in which everything is checked except the codes themselves.
@@ -36,7 +36,7 @@ pub(super) struct Exact<'a> {
     pub(super) normals: bool,
     nonzeros: usize,
     escapes: usize,
-    /// Nonzeros before each [`BLOCK`] of Gaussians.
+    /// Number of nonzeros before each [`BLOCK`] of Gaussians.
     offsets: Vec<usize>,
     limits: Limits,
 }
@@ -75,7 +75,7 @@ impl<'a> Exact<'a> {
         Ok(exact)
     }
 
-    /// Reads the dictionary and checks everything that says where codes are.
+    /// Reads the dictionary, and checks everything that says where codes are.
     fn validate_codes(&mut self, degree: ShDegree) -> Result<()> {
         let n = self.gaussians;
         let checked = &self.checked;
@@ -125,7 +125,7 @@ impl<'a> Exact<'a> {
         Ok(())
     }
 
-    /// Gaussians `range`. Escapes are numbered from its start.
+    /// Returns the Gaussians of `range`. Escapes are numbered from the start of the range.
     pub(super) fn part(&self, range: Range<usize>) -> Result<Model> {
         let (checked, n) = (&self.checked, self.gaussians);
         let budget = self.budget_for_geometry(range.len())?;
@@ -167,7 +167,7 @@ impl<'a> Exact<'a> {
         Model::new(geometry, self.meta.clone(), self.dictionary.clone(), codes, self.record.clone())
     }
 
-    /// What the limits leave for codes after everything else of `count` Gaussians.
+    /// Returns the budget that the limits leave for codes after everything else of `count` Gaussians.
     fn budget_for_geometry(&self, count: usize) -> Result<MemoryBudget<'_>> {
         let normals = if self.normals { 3 * size_of::<f32>() } else { 0 };
         let extras = extras(&self.checked, self.gaussians, &(0..0))?;
@@ -177,7 +177,7 @@ impl<'a> Exact<'a> {
         Ok(budget)
     }
 
-    /// Nonzeros of Gaussians `range`.
+    /// Returns the number of nonzeros of each Gaussian of `range`.
     fn counts(&self, range: Range<usize>) -> Result<Vec<u8>> {
         let (checked, n) = (&self.checked, self.gaussians);
         if self.layout != Layout::Paper {
@@ -191,7 +191,7 @@ impl<'a> Exact<'a> {
         })
     }
 
-    /// Nonzeros `range` of all.
+    /// Returns the indices and values of nonzeros `range`, counted over all Gaussians.
     fn read_codes(&self, range: Range<usize>) -> Result<(Indices, Values)> {
         let (checked, all) = (&self.checked, [self.nonzeros]);
         let values = if self.layout.values() == ValueType::F16 {
@@ -218,12 +218,12 @@ impl<'a> Exact<'a> {
         Ok((indices, values))
     }
 
-    /// The Gaussians of escapes `range`.
+    /// Returns the numbers of the Gaussians of escapes `range`.
     fn escaped(&self, range: Range<usize>) -> Result<Vec<u32>> {
         self.checked.part(tensor::ESCAPED, Dtype::U32, &[self.escapes], &range)
     }
 
-    /// The escapes of Gaussians `range`.
+    /// Returns the range of the escapes that are of Gaussians `range`.
     fn escaped_of(&self, range: &Range<usize>) -> Result<Range<usize>> {
         if self.escapes == 0 {
             return Ok(0..0);
@@ -240,7 +240,7 @@ impl<'a> Exact<'a> {
         Ok(low..low + gaussians.partition_point(|&g| (g as usize) < range.end))
     }
 
-    /// The escapes `escaped`, which are of Gaussians `range`.
+    /// Returns the escapes `escaped`, which must be those of Gaussians `range`.
     fn escapes(&self, range: &Range<usize>, escaped: &Range<usize>) -> Result<Escapes> {
         if escaped.is_empty() {
             return Ok(Escapes::default());
@@ -256,7 +256,7 @@ impl<'a> Exact<'a> {
 const CODES: [&str; 3] = [tensor::DICTIONARY, tensor::INDICES, tensor::VALUES];
 const ESCAPES: [&str; 2] = [tensor::ESCAPED, tensor::ESCAPE_ROWS];
 
-/// Refuses tensors that this layout does not define and a reader must not ignore.
+/// Refuses tensors that `layout` does not define and that a reader must not ignore.
 pub(super) fn refuse_unknown(checked: &Checked<'_>, layout: Layout, degree: ShDegree) -> Result<()> {
     let counts = if layout == Layout::Paper { tensor::POINTERS } else { tensor::COUNTS };
     let coded = degree != ShDegree::ZERO;

@@ -25,7 +25,7 @@ fn file_layout(checked: &Checked<'_>) -> Result<Layout> {
     checked.text(key::LAYOUT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))
 }
 
-/// The layout of a scene, which must belong to the version of the file.
+/// Returns the layout of a scene, which must belong to the version of the file.
 pub(super) fn layout(checked: &Checked<'_>) -> Result<Layout> {
     record(checked)?;
     let layout = file_layout(checked)?;
@@ -56,7 +56,7 @@ pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
     })
 }
 
-/// The offset of a scene, which few have.
+/// Returns the offset of a scene. Few scenes have an offset.
 fn offset(checked: &Checked<'_>) -> Result<Option<Offset>> {
     if !checked.has_text(key::OFFSET) {
         return Ok(None);
@@ -68,7 +68,7 @@ fn offset(checked: &Checked<'_>) -> Result<Option<Offset>> {
     Offset::new(numbers).map_err(|e| checked.malformed(format!("metadata 'offset': {e}")))
 }
 
-/// The dictionary of a scene or of a dictionary file.
+/// Returns the dictionary of a scene or of a dictionary file.
 pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree, limits: &Limits) -> Result<Dictionary> {
     let dim = degree.rest();
     let atoms = match checked.view(tensor::DICTIONARY)?.shape {
@@ -109,7 +109,7 @@ pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
     Ok(record)
 }
 
-/// The coded column of `n` values in the tensor `name`.
+/// Returns the coded column of `n` values in the tensor `name`.
 pub(super) fn column<'c>(checked: &'c Checked<'_>, name: &str, n: usize) -> Result<Column<'c>> {
     let len = checked.list_len(name)?;
     Column::new(checked.data(name, Dtype::U8, &[len])?, n).map_err(|e| wrong(checked, name, e))
@@ -119,7 +119,7 @@ fn wrong(checked: &Checked<'_>, name: &str, error: ColumnError) -> Error {
     checked.malformed(format!("tensor '{}': {error}", name.escape_debug()))
 }
 
-/// Refuses extras that are not named as a property of a PLY can be.
+/// Refuses extras with names that a property of a PLY cannot have.
 pub(super) fn check_extra_names(checked: &Checked<'_>) -> Result<()> {
     let names = || checked.names().filter_map(|name| name.strip_prefix(EXTRA_PREFIX));
     match names().find(|name| !is_extra_name(name)) {
@@ -132,8 +132,9 @@ pub(super) fn check_extra_names(checked: &Checked<'_>) -> Result<()> {
     }
 }
 
-/// Properties that 3DGS does not define, of Gaussians `range` of `n`; none if only a first part of the file is there. In
-/// packed files they lie in the order of the source, in exact ones by their sizes.
+/// Returns the properties that 3DGS does not define, of Gaussians `range` of `n`. There are none if only a first part of
+/// the file is there. In packed files, these properties lie in the order of the source, and are returned in it. In exact
+/// files, they lie in the order of their sizes, and are returned sorted by name.
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     check_extra_names(checked)?;
     let mut out = Vec::new();

@@ -1,13 +1,13 @@
-//! The JSON header of a safetensors file: its metadata, and where its tensors are.
+//! The JSON header of a safetensors file: its metadata, and the positions of its tensors.
 
 use safetensors::Dtype;
 
 use super::json::Json;
 use crate::support::order::order;
 
-/// The member of the header that is no tensor.
+/// The member of the header that is not a tensor.
 const METADATA: &str = "__metadata__";
-/// All types of values by their names.
+/// All types of values, by their names.
 const DTYPES: [(&str, Dtype); 22] = [
     ("BOOL", Dtype::BOOL),
     ("F4", Dtype::F4),
@@ -38,21 +38,21 @@ const DTYPES: [(&str, Dtype); 22] = [
 pub(super) struct TensorInfo {
     pub(super) dtype: Dtype,
     pub(super) shape: Vec<usize>,
-    /// Where it starts and ends, counted from the end of the header.
+    /// Start and end of the tensor, counted from the end of the header.
     pub(super) data_offsets: (usize, usize),
 }
 
 /// Tensors that lie one after another, and metadata.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
-    /// Sorted by their names.
+    /// The tensors, sorted by their names.
     tensors: Vec<(String, TensorInfo)>,
-    /// Texts by their names.
+    /// The metadata: texts by their names.
     metadata: Json,
 }
 
 impl Header {
-    /// Reads the JSON `text`. The message says what is wrong with it.
+    /// Reads the JSON `text`. The error says what is wrong with it.
     pub(super) fn read(text: &[u8]) -> Result<Self, String> {
         let Json::Object(members) = Json::parse(text).map_err(|e| format!("the header: {e}"))? else {
             return Err(invalid("the header is not an object"));
@@ -94,7 +94,7 @@ impl Header {
         Ok(())
     }
 
-    /// Bytes of all tensors.
+    /// Returns the number of bytes of all tensors.
     pub(super) fn data_bytes(&self) -> usize {
         self.tensors.iter().map(|(_, tensor)| tensor.data_offsets.1).max().unwrap_or(0)
     }
@@ -104,19 +104,19 @@ impl Header {
         self.tensors.get(place).map(|tensor| &tensor.1)
     }
 
-    /// The names of all tensors, sorted.
+    /// Returns the names of all tensors, sorted.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.tensors.iter().map(|(name, _)| name.as_str())
     }
 
-    /// All tensors in the order in which they lie.
+    /// Returns all tensors in the order in which they lie.
     pub(super) fn by_place(&self) -> Vec<&(String, TensorInfo)> {
         let start = |k: usize| self.tensors.get(k).map(|tensor| tensor.1.data_offsets);
         let places = order(self.tensors.len(), &mut |a, b| start(a).cmp(&start(b)));
         places.into_iter().filter_map(|k| self.tensors.get(k)).collect()
     }
 
-    /// The metadata entry `key`.
+    /// Returns the metadata entry `key`.
     pub(super) fn text(&self, key: &str) -> Option<&str> {
         self.metadata.get(key)?.text()
     }
@@ -148,10 +148,10 @@ mod tests {
         }
     }
 
-    /// What bytes of a header are replaced with.
+    /// Bytes that replace bytes of a header.
     const BYTES: &[u8] = b"0123456789\"{}[],:-.xyzabU8F3216";
 
-    /// Takes the same headers as the safetensors crate, which takes members that are there twice.
+    /// [`Header::read`] takes the same headers as the safetensors crate. Only that crate takes headers with a member twice.
     #[test]
     fn headers_are_read_as_by_safetensors() {
         let text = br#"{"__metadata__":{"a":"b","c":""},"y":{"dtype":"F32","shape":[2,1],"data_offsets":[3,11]},

@@ -5,10 +5,10 @@
 
 use crate::support::order::order;
 
-/// Most arrays and objects within one another, as `serde_json` has it.
+/// Largest depth of arrays and objects within one another, as in `serde_json`.
 const MOST_DEPTH: usize = 127;
 
-/// A value.
+/// A JSON value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) enum Json {
     #[default]
@@ -23,7 +23,7 @@ pub(super) enum Json {
 }
 
 impl Json {
-    /// The value in `text`. The message says what is wrong with it.
+    /// Parses the value in `text`. The error says what is wrong with it.
     pub(super) fn parse(text: &[u8]) -> Result<Self, String> {
         let mut parser = Parser { text, at: 0 };
         let value = parser.value(MOST_DEPTH)?;
@@ -33,19 +33,19 @@ impl Json {
         }
     }
 
-    /// The member `name` of an object, if there is one.
+    /// Returns the member `name` of an object, if there is one.
     pub(super) fn get(&self, name: &str) -> Option<&Self> {
         let members = self.members()?;
         let place = members.binary_search_by(|member| member.0.as_str().cmp(name)).ok()?;
         members.get(place).map(|member| &member.1)
     }
 
-    /// The members of an object, sorted by their names.
+    /// Returns the members of an object, sorted by their names; `None` for other values.
     pub(super) fn members(&self) -> Option<&[(String, Self)]> {
         if let Self::Object(members) = self { Some(members) } else { None }
     }
 
-    /// The items of a list.
+    /// Returns the items of a list; `None` for other values.
     pub(super) fn items(&self) -> Option<&[Self]> {
         if let Self::List(items) = self { Some(items) } else { None }
     }
@@ -58,16 +58,16 @@ impl Json {
         if let Self::Bool(value) = self { Some(*value) } else { None }
     }
 
-    /// A number that is one of `T`.
+    /// Returns the number of type `T`; `None` if the value is not such a number.
     pub(super) fn number<T: std::str::FromStr>(&self) -> Option<T> {
         if let Self::Number(text) = self { text.parse().ok() } else { None }
     }
 }
 
-/// Text that is read value by value.
+/// A parser of text, value by value.
 struct Parser<'t> {
     text: &'t [u8],
-    /// The place of the next byte.
+    /// Position of the next byte.
     at: usize,
 }
 
@@ -80,7 +80,7 @@ impl Parser<'_> {
         self.text.get(self.at).copied()
     }
 
-    /// The next byte after white space, which is not taken.
+    /// Skips white space, and returns the next byte without taking it.
     fn next_token(&mut self) -> Option<u8> {
         while let Some(b' ' | b'\n' | b'\t' | b'\r') = self.peek() {
             self.at += 1;
@@ -88,14 +88,14 @@ impl Parser<'_> {
         self.peek()
     }
 
-    /// Takes the next byte.
+    /// Takes and returns the next byte.
     fn take(&mut self) -> Result<u8, String> {
         let byte = self.peek().ok_or_else(|| self.wrong("it ends early"))?;
         self.at += 1;
         Ok(byte)
     }
 
-    /// A value with at most `depth` arrays and objects within one another.
+    /// Takes a value with at most `depth` arrays and objects within one another.
     fn value(&mut self, depth: usize) -> Result<Json, String> {
         match self.next_token() {
             Some(b'"') => self.string().map(Json::Text),
@@ -145,7 +145,7 @@ impl Parser<'_> {
         }
     }
 
-    /// The character that an escape stands for.
+    /// Takes an escape after its backslash, and returns the character that it stands for.
     fn escaped(&mut self) -> Result<char, String> {
         Ok(match self.take()? {
             byte @ (b'"' | b'\\' | b'/') => byte.into(),
@@ -168,7 +168,7 @@ impl Parser<'_> {
         })
     }
 
-    /// Four hexadecimal digits.
+    /// Takes four hexadecimal digits, and returns their number.
     fn hexadecimal(&mut self) -> Result<u32, String> {
         let mut code = 0;
         for _ in 0..4 {
@@ -178,7 +178,7 @@ impl Parser<'_> {
         Ok(code)
     }
 
-    /// Takes `end`, or a comma before another item. Returns whether there is another.
+    /// Takes `end`, or a comma before another item. Returns whether there is another item.
     fn goes_on(&mut self, end: u8) -> Result<bool, String> {
         match self.next_token() {
             Some(byte) if byte == end || byte == b',' => {
@@ -230,7 +230,7 @@ impl Parser<'_> {
     }
 }
 
-/// Whether `text` is a number as JSON writes it: no plus sign, no leading zeros, digits on both sides of a point.
+/// Returns whether `text` is a number as JSON writes it: no plus sign, no leading zeros, digits on both sides of a point.
 pub(super) fn is_number(text: &str) -> bool {
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     let text = text.strip_prefix('-').unwrap_or(text);
@@ -280,7 +280,7 @@ mod tests {
         }
     }
 
-    /// The same value as `serde_json` has it.
+    /// Returns the same value as `serde_json` has it.
     fn of_serde(value: &serde_json::Value) -> Json {
         use serde_json::Value;
         match value {
@@ -295,7 +295,7 @@ mod tests {
         }
     }
 
-    /// The value with its numbers as `serde_json` writes them.
+    /// Returns the value with its numbers as `serde_json` writes them.
     fn rewritten(value: Json) -> Json {
         match value {
             Json::Number(text) => {
@@ -310,7 +310,7 @@ mod tests {
         }
     }
 
-    /// Refuses and takes the same as `serde_json`, but for members that are there twice.
+    /// Checks that [`Json::parse`] takes and refuses the same texts as `serde_json`, except texts with a member twice.
     fn agrees(text: &[u8]) {
         let shown = String::from_utf8_lossy(text);
         match (Json::parse(text), serde_json::from_slice::<serde_json::Value>(text)) {

@@ -19,18 +19,18 @@ pub enum Layout {
 }
 named!(Layout, "layout", F32 => "f32", F16 => "f16", Paper => "paper", Packed => "packed");
 
-/// How the codes of an exact file are stored.
+/// The way in which the codes of an exact file are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum CodeLayout {
     /// u8 counts, u8 or u16 indices, values of their own type.
     #[default]
     Compact,
-    /// As the paper counts them: i32 pointers, i32 indices, f32 values.
+    /// Codes as the paper counts them: i32 pointers, i32 indices, f32 values.
     Paper,
 }
 
 impl Layout {
-    /// Type of the values of codes in files of this layout.
+    /// Returns the type of the values of codes in files of this layout.
     #[must_use]
     pub fn values(self) -> ValueType {
         match self {
@@ -39,13 +39,13 @@ impl Layout {
         }
     }
 
-    /// How codes are stored in exact files of this layout.
+    /// Returns the way in which codes are stored in exact files of this layout.
     #[must_use]
     pub fn codes(self) -> CodeLayout {
         if self == Self::Paper { CodeLayout::Paper } else { CodeLayout::Compact }
     }
 
-    /// The layout of an exact file with these codes.
+    /// Returns the layout of an exact file with these codes.
     #[must_use]
     pub fn of(codes: CodeLayout, values: ValueType) -> Self {
         match (codes, values) {

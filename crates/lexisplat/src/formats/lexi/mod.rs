@@ -1,9 +1,9 @@
 //! The .lexi file: a safetensors file that holds a [`Model`](crate::Model) or a
 //! [`Packed`](crate::packed::Packed) scene.
 //!
-//! docs/FORMAT.md is the specification. Every byte is covered by a CRC-32: each tensor by an entry of the
-//! metadata key `checksums`, the header by the tensor `checksum.header`. In packed files one CRC-32 covers the
-//! header and the tensor `packed.head`, which holds one for each range of `packed.data`.
+//! docs/FORMAT.md is the specification. Every byte is covered by a CRC-32. The metadata key `checksums` has an entry for
+//! each tensor, and the tensor `checksum.header` covers the header. In packed files, one CRC-32 covers the header and the
+//! tensor `packed.head`. This tensor holds a CRC-32 for each range of `packed.data`.
 
 mod checked;
 mod dictionary_file;

@@ -14,11 +14,11 @@ use crate::support::error::Result;
 use crate::support::limits::Limits;
 use crate::support::memory_budget::MemoryBudget;
 
-/// Largest number of Gaussians that a byte of a packed file can stand for: a rotation takes at least 3 raw
-/// bits. A header that claims more is refused before anything is allocated.
+/// Largest number of Gaussians that a byte of a packed file can stand for: a rotation takes at least 3 raw bits. A header
+/// that claims more Gaussians is refused before anything is allocated.
 const GAUSSIANS_PER_BYTE: u64 = 3;
 
-/// The packed scene of a file whose checksums hold, and whose [head](head) is `head`.
+/// Returns the packed scene of a file whose checksums hold, and whose [head](head) is `head`.
 pub(super) fn packed(checked: &Checked<'_>, head: PackedHead, limits: &Limits) -> Result<Packed> {
     let n = head.gaussians;
     let budget = MemoryBudget::new(limits, &checked.file, checked.bytes().len() as u64);
@@ -37,7 +37,7 @@ pub(super) fn packed(checked: &Checked<'_>, head: PackedHead, limits: &Limits) -
     Ok(Packed::new(head, extras(checked, n, &(0..n))?, order, data(checked)?.to_vec()))
 }
 
-/// The data of a packed file, or the first part of them if they are not all there.
+/// Returns the data of a packed file, or their first part if not all of them are there.
 pub(super) fn data<'a>(checked: &'a Checked<'_>) -> Result<&'a [u8]> {
     if !checked.is_whole() {
         return Ok(checked.first_of(tensor::DATA).map(|(_, _, data)| data).unwrap_or_default());
@@ -45,12 +45,12 @@ pub(super) fn data<'a>(checked: &'a Checked<'_>) -> Result<&'a [u8]> {
     checked.data(tensor::DATA, Dtype::U8, &length(checked, tensor::DATA, Dtype::U8)?)
 }
 
-/// Where the data of a packed file start, and their length.
+/// Returns the position at which the data of a packed file start, and their length.
 pub(super) fn data_place(checked: &Checked<'_>) -> (u64, u64) {
     checked.first_of(tensor::DATA).map(|(start, length, _)| (start, length)).unwrap_or_default()
 }
 
-/// Whether the order of the source is there.
+/// Returns whether the order of the source is there.
 pub(super) fn has_order(checked: &Checked<'_>) -> bool {
     checked.is_whole() && checked.has(tensor::ORDER)
 }
@@ -62,8 +62,8 @@ fn length(checked: &Checked<'_>, name: &str, dtype: Dtype) -> Result<[usize; 1]>
     }
 }
 
-/// Everything of a packed scene that is not as long as the scene. Everything is checked except the [columns](check_columns)
-/// and what only decoding finds.
+/// Returns the head of a packed scene: everything that is not as long as the scene. Checks everything except the
+/// [columns](check_columns) and damage that only decoding finds.
 pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead> {
     let file_bytes = checked.bytes().len() as u64;
     let gaussians: u64 = checked.number(key::GAUSSIANS)?;
@@ -123,7 +123,7 @@ fn reached(json: &Json) -> Option<ReachedRecord> {
     })
 }
 
-/// Refuses columns that are not of `n` Gaussians: the order of the source, and extras.
+/// Refuses columns that are not of `n` Gaussians. The columns are the order of the source, and extras.
 pub(super) fn check_columns(checked: &Checked<'_>, n: usize) -> Result<()> {
     if has_order(checked) && !is_permutation(checked, n)? {
         return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
@@ -131,7 +131,7 @@ pub(super) fn check_columns(checked: &Checked<'_>, n: usize) -> Result<()> {
     extras(checked, n, &(0..0)).map(drop)
 }
 
-/// Places in the source of Gaussians `range` of `n`.
+/// Returns the places in the source of the Gaussians of `range`. The file has `n` Gaussians.
 pub(super) fn order(checked: &Checked<'_>, n: usize, range: Range<usize>) -> Result<Vec<u32>> {
     if !checked.is_whole() {
         return Err(checked.malformed("only a first part is there, without the order of the source"));
@@ -144,13 +144,13 @@ pub(super) fn order(checked: &Checked<'_>, n: usize, range: Range<usize>) -> Res
     }
 }
 
-/// Gaussians whose places are looked at together.
+/// Number of Gaussians whose places are looked at together.
 const PLACES_AT_ONCE: usize = 1 << 16;
 
-/// Whether the order names each of `n` Gaussians once.
+/// Returns whether the order names each of `n` Gaussians once.
 fn is_permutation(checked: &Checked<'_>, n: usize) -> Result<bool> {
     let mut seen = vec![0_u64; n.div_ceil(64)];
-    // The column is looked at once also if it has no values.
+    // The column is looked at once even if it has no values.
     for first in (0..n.max(1)).step_by(PLACES_AT_ONCE) {
         for place in order(checked, n, first..n.min(first + PLACES_AT_ONCE))? {
             let place = place as usize;

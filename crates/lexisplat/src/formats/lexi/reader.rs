@@ -22,23 +22,23 @@ use crate::support::limits::Limits;
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 use crate::support::parallel::map_chunks;
 
-/// Gaussians of a part of an exact layout.
+/// Number of Gaussians of a part of an exact layout.
 const PART: usize = 1 << 16;
-/// Packed chunks decoded before they are handed on.
+/// Number of packed chunks that are decoded before they are handed on.
 const CHUNKS_AT_ONCE: usize = 16;
 
 /// Reads a .lexi file.
 ///
 /// # Errors
-/// [`crate::Error::Io`] if it cannot be opened, [`crate::Error::Format`] if it is damaged,
-/// [`crate::Error::Limit`] if it asks for more than `limits` allow.
+/// [`crate::Error::Io`] if the file cannot be opened, [`crate::Error::Format`] if it is damaged, [`crate::Error::Limit`] if
+/// it asks for more than `limits` allow.
 pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Model> {
     let path = path.as_ref();
     let bytes = Input::open_within(path, limits)?;
     read_bytes(&path.display().to_string(), &bytes, limits)
 }
 
-/// Reads a .lexi file that is in memory. Errors call it `file`.
+/// Reads a .lexi file that is in memory. `file` is its name in errors.
 ///
 /// # Errors
 /// As [`read`].
@@ -70,7 +70,7 @@ enum Kind<'a> {
 #[derive(Debug)]
 struct PackedFile<'a> {
     checked: Checked<'a>,
-    /// Its Gaussians are those that are there.
+    /// The head, with the number of Gaussians that are there.
     head: PackedHead,
     decoder: Decoder,
     /// Number of Gaussians of the whole file.
@@ -79,11 +79,11 @@ struct PackedFile<'a> {
 }
 
 impl<'a> LexiReader<'a> {
-    /// Checks the .lexi file in `bytes`, which are borrowed or owned. Errors call it `file`.
+    /// Checks the .lexi file in `bytes`, which are borrowed or owned. `file` is its name in errors.
     ///
     /// # Errors
-    /// As [`read`]. Damage in the codes themselves, and what is over [`Limits::bytes`] and
-    /// [`Limits::expansion`], is only found by decoding.
+    /// As [`read`]. Only decoding finds damage in the codes themselves, and contents over [`Limits::bytes`] or
+    /// [`Limits::expansion`].
     pub fn open(
         file: impl Into<String>,
         bytes: impl AsRef<[u8]> + Send + Sync + 'a,
@@ -92,15 +92,16 @@ impl<'a> LexiReader<'a> {
         Self::with_extent(file.into(), Box::new(bytes), Extent::Whole, limits)
     }
 
-    /// Checks the first bytes of a packed .lexi file, as many as there are. Errors call it `file`.
+    /// Checks the first bytes of a packed .lexi file, as many as there are. `file` is its name in errors.
     ///
-    /// It then reads the Gaussians whose base is whole there, as fine as the bytes that are there make them. Where the next
-    /// layer is missing they look as the file says to fill its place. Extras and the order of the source are left
-    /// out unless all bytes of the file are there. [`Limits::gaussians`] and [`Limits::bytes`] concern what is there.
+    /// The reader then has the Gaussians whose base is whole in these bytes, as fine as the bytes make them. Where the next
+    /// layer is missing, Gaussians look as the file says to fill the place of that layer. Extras and the order of the
+    /// source are left out unless all bytes of the file are there. [`Limits::gaussians`] and [`Limits::bytes`] concern only
+    /// the Gaussians and bytes that are there.
     ///
     /// # Errors
     /// As [`Self::open`]. [`crate::FormatError::Truncated`] says how many bytes are needed at least.
-    /// [`crate::FormatError::Malformed`] for files that are only read whole, those of other layouts.
+    /// [`crate::FormatError::Malformed`] for files of other layouts, which are only read whole.
     pub fn open_first(
         file: impl Into<String>,
         bytes: impl AsRef<[u8]> + Send + Sync + 'a,
@@ -132,27 +133,28 @@ impl<'a> LexiReader<'a> {
         Ok(Self { kind, layout, limits: *limits, extras, attribute_bytes })
     }
 
-    /// Decodes at most this many parts of the nonzeros of SH-rest from here on, those of the largest values first. With 0
-    /// there is no SH-rest. Base colours are then those that are seen on average.
+    /// Decodes at most `parts` parts of the nonzeros of SH-rest from here on. The parts with the largest values come first.
+    /// With 0 parts there is no SH-rest, and base colours are those that are seen on average.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a file that is not packed, whose nonzeros have no parts.
+    /// [`Error::Parameter`] for a file that is not packed. Its nonzeros have no parts.
     pub fn with_sh_parts(mut self, parts: usize) -> Result<Self> {
         self.decode_options("sh_parts", parts)?.sh_parts = parts;
         Ok(self)
     }
 
-    /// Verifies the checksums of the integers that ranges decode to from here on, which are not verified otherwise.
-    /// Where one is wrong although that of the bytes holds, a decoder is at fault.
+    /// Verifies the checksums of the integers that ranges decode to from here on. They are not verified otherwise. If such
+    /// a checksum is wrong although the checksum of the bytes holds, a decoder is at fault.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a file that is not packed, which has none.
+    /// [`Error::Parameter`] for a file that is not packed, which has no such checksums.
     pub fn with_integers_verified(mut self) -> Result<Self> {
         self.decode_options("verify", true)?.verify = true;
         Ok(self)
     }
 
-    /// The choices of decoding chunks of a packed file. Errors call the choice that is made `name` and `value`.
+    /// Returns the options of decoding chunks of a packed file. Errors call the option that is set `name`, and its value
+    /// `value`.
     fn decode_options(&mut self, name: &'static str, value: impl ToString) -> Result<&mut DecodeOptions> {
         match &mut self.kind {
             Kind::Packed(packed) => Ok(&mut packed.decoder.options),
@@ -160,19 +162,20 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// The layers, chunks and ranges of a packed file, of the whole file also if only a first part of it is there.
+    /// Returns the layers, chunks and ranges of a packed file. They are those of the whole file, even if only a first part
+    /// of it is there.
     #[must_use]
     pub fn outline(&self) -> Option<&Outline> {
         self.packed_file().map(|packed| &packed.outline)
     }
 
-    /// Number of Gaussians of the whole file. There are [fewer](Self::len) if only a first part of it is there.
+    /// Returns the number of Gaussians of the whole file. There are [fewer](Self::len) if only a first part of it is there.
     #[must_use]
     pub fn whole_len(&self) -> usize {
         self.packed_file().map_or(self.len(), |packed| packed.whole)
     }
 
-    /// Number of Gaussians that are there.
+    /// Returns the number of Gaussians that are there.
     #[must_use]
     pub fn len(&self) -> usize {
         match &self.kind {
@@ -181,19 +184,19 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Layout of the file.
+    /// Returns the layout of the file.
     #[must_use]
     pub fn layout(&self) -> Layout {
         self.layout
     }
 
-    /// Version of the format that the file is of.
+    /// Returns the version of the format of the file.
     #[must_use]
     pub fn version(&self) -> u64 {
         match &self.kind {
@@ -202,13 +205,13 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// SH degree.
+    /// Returns the SH degree.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
         self.dictionary().degree()
     }
 
-    /// Comments and marks of the source.
+    /// Returns the comments and marks of the source.
     #[must_use]
     pub fn meta(&self) -> &SceneMeta {
         match &self.kind {
@@ -217,7 +220,7 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// How it was made and what it promises.
+    /// Returns the record of how the file was made and what it promises.
     #[must_use]
     pub fn record(&self) -> &Record {
         match &self.kind {
@@ -226,7 +229,7 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// The atoms.
+    /// Returns the atoms.
     #[must_use]
     pub fn dictionary(&self) -> &Dictionary {
         match &self.kind {
@@ -235,7 +238,7 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// What a packed file says of itself; `None` for exact layouts.
+    /// Returns the head of a packed file; `None` for exact layouts.
     #[must_use]
     pub fn packed_head(&self) -> Option<&PackedHead> {
         self.packed_file().map(|packed| &packed.head)
@@ -248,27 +251,27 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// Whether a packed file holds the order of its source.
+    /// Returns whether a packed file holds the order of its source.
     #[must_use]
     pub fn order_kept(&self) -> bool {
         self.packed_file().is_some_and(|packed| super::packed::has_order(&packed.checked))
     }
 
-    /// Bytes of each tensor in the file, and of the header under `header`, as
-    /// [`LexiWriter::attribute_bytes`](super::LexiWriter::attribute_bytes).
+    /// Returns the number of bytes of each tensor in the file, and of the header under the name `header`, as
+    /// [`LexiWriter::attribute_bytes`](super::LexiWriter::attribute_bytes) does.
     #[must_use]
     pub fn attribute_bytes(&self) -> &[(String, u64)] {
         &self.attribute_bytes
     }
 
-    /// Bytes that stand for SH-rest in an exact layout, as
-    /// [`LexiWriter::sh_bytes`](super::LexiWriter::sh_bytes).
+    /// Returns the number of bytes that stand for SH-rest in an exact layout, as
+    /// [`LexiWriter::sh_bytes`](super::LexiWriter::sh_bytes) does.
     #[must_use]
     pub fn sh_bytes(&self) -> u64 {
         super::write::sh_bytes(&self.attribute_bytes)
     }
 
-    /// For Gaussians `range` of a packed file that holds the order of its source, their places in the source.
+    /// Returns the places in the source of the Gaussians of `range`, for a packed file that holds the order of its source.
     ///
     /// # Errors
     /// [`crate::Error::Format`] if the file does not hold the order or the range ends after [`Self::len`].
@@ -293,7 +296,7 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// The packed scene, not decoded; `None` for exact layouts.
+    /// Returns the packed scene without decoding it; `None` for exact layouts.
     ///
     /// # Errors
     /// [`crate::Error::Format`] for damage, and if only a first part of the file is there; [`crate::Error::Limit`] for a
@@ -307,16 +310,16 @@ impl<'a> LexiReader<'a> {
         packed.take(&self.limits).map(Some)
     }
 
-    /// Hands all Gaussians to `take`, part after part in the order of the file: the number of the first one,
-    /// and the part.
+    /// Hands all Gaussians to `take`, part after part in the order of the file. `take` gets the number of the first
+    /// Gaussian of a part, and the part.
     ///
     /// # Errors
-    /// As [`read`], and what `take` returns.
+    /// As [`read`], and errors that `take` returns.
     pub fn each(&self, take: &mut dyn FnMut(usize, Model) -> Result<()>) -> Result<()> {
         self.parts(false, take).map(drop)
     }
 
-    /// [`Self::each`] with parts of `at_once` Gaussians for exact layouts, for the fuzz targets.
+    /// Does the same as [`Self::each`], with parts of `at_once` Gaussians for exact layouts, for the fuzz targets.
     #[cfg(feature = "fuzzing")]
     #[doc(hidden)]
     pub fn each_of(&self, at_once: usize, take: &mut dyn FnMut(usize, Model) -> Result<()>) -> Result<()> {
@@ -326,7 +329,7 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// [`Self::each`]; returns the bits of each stream of a packed file if `count_bits`.
+    /// Does the same as [`Self::each`], and returns the bits of each stream of a packed file if `count_bits`.
     pub(crate) fn parts(
         &self,
         count_bits: bool,
@@ -362,12 +365,12 @@ fn exact_parts(
 }
 
 impl PackedFile<'_> {
-    /// The scene that is there, not decoded.
+    /// Returns the packed scene that is there, not decoded.
     fn take(&self, limits: &Limits) -> Result<Packed> {
         super::packed::packed(&self.checked, self.head.clone(), limits)
     }
 
-    /// Decodes `chunks` together, hands them to `take` one after the other, and returns the bits they took.
+    /// Decodes `chunks` together, hands them to `take` one after the other, and returns the bits that they took.
     fn chunks(
         &self,
         chunks: Range<usize>,
@@ -387,7 +390,7 @@ impl PackedFile<'_> {
         let parts = map_chunks(chunks.len(), 1, |c| {
             self.decoder.chunk(data, chunks.start + c.start, &budget, count_bits)
         });
-        // Those of all chunks at once: a block of a column holds rows of several.
+        // The extras of all chunks are read at once, because a block of a column holds rows of several chunks.
         let own_extras = extras(&self.checked, n, &(first..first + held))?;
         let mut bit_counts = crate::packed::BitCounts::default();
         for (range, part) in spans.iter().zip(parts) {
@@ -421,7 +424,7 @@ impl SplatSource for LexiReader<'_> {
         bytes / LexiReader::len(self).max(1) as u64
     }
 
-    /// In the order of its source, if the file holds it; parts are in the order of the file.
+    /// Returns the scene in the order of its source, if the file holds that order. Parts are in the order of the file.
     fn whole(&self) -> Result<Cow<'_, Splats>> {
         if self.order_kept() {
             return Ok(Cow::Owned(self.model()?.into_splats()));
@@ -440,7 +443,7 @@ impl SplatSource for LexiReader<'_> {
             }
             Kind::Packed(packed) => packed,
         };
-        // Chunks are decoded whole, and the Gaussians around the range left out.
+        // Chunks are decoded whole, and the Gaussians outside of the range are left out.
         let spans = packed.decoder.spans();
         let first = spans.partition_point(|span| span.end <= range.start);
         let chunks = first..spans.partition_point(|span| span.start < range.end).max(first);
@@ -458,8 +461,8 @@ impl SplatSource for LexiReader<'_> {
     }
 }
 
-/// Bytes that are there of all tensors that are not to be ignored, in the order in which writers list them, and of the
-/// header.
+/// Returns the number of bytes that are there of each tensor that must not be ignored, in the order in which writers list
+/// tensors, and the number of bytes of the header.
 fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
     const LAST: [&str; 7] = [
         tensor::DICTIONARY,

@@ -1,15 +1,15 @@
-//! Names and numbers of the file format, once.
+//! Names and numbers of the file format, each defined once.
 
 /// Version of files in the layouts `f32`, `f16` and `paper`.
 pub const VERSION: u64 = 1;
 /// Version of files in the layout `packed`.
 pub const PACKED_VERSION: u64 = 3;
-/// Newest version of the format that is read.
+/// Newest version of the format that can be read.
 pub const MAX_VERSION: u64 = 3;
 
-/// Header and data start at multiples of this, as the safetensors format asks.
+/// Number of bytes of which the starts of header and data are multiples, as the safetensors format asks.
 pub(super) const HEADER_ALIGNMENT: usize = 8;
-/// Bytes of the length that precedes the JSON header.
+/// Number of bytes of the length that precedes the JSON header.
 pub(super) const LENGTH_BYTES: usize = 8;
 
 /// Value of [`key::FORMAT`] in a scene.
@@ -17,13 +17,13 @@ pub(super) const FORMAT: &str = "lexi";
 /// Value of [`key::FORMAT`] in a file that holds only a dictionary.
 pub(super) const DICTIONARY_FORMAT: &str = "lexi-dictionary";
 
-/// Prefix of tensors that hold per-Gaussian properties 3DGS does not define.
+/// Prefix of tensors that hold per-Gaussian properties that 3DGS does not define.
 pub(super) const EXTRA_PREFIX: &str = "extra.";
-/// Prefix of tensors a reader may ignore.
+/// Prefix of tensors that a reader may ignore.
 pub(super) const IGNORED_PREFIX: &str = "x-";
 
-/// Names and widths of the tensors of geometry, in the order of [`Geometry::floats`](crate::Geometry::floats). A file
-/// may lack the last one, the normals.
+/// Names and widths of the tensors of geometry, in the order of [`Geometry::floats`](crate::Geometry::floats). A file may
+/// lack the last tensor, the normals.
 pub(super) const GEOMETRY: [(&str, usize); 6] = [
     (tensor::POSITION, 3),
     (tensor::DC, 3),
@@ -36,7 +36,7 @@ pub(super) const GEOMETRY: [(&str, usize); 6] = [
 /// Names of the tensors of a packed file, in the order in which sizes are listed.
 pub(super) const PACKED: [&str; 3] = [tensor::HEAD, tensor::DATA, tensor::ORDER];
 
-/// The shape of a tensor of geometry of `n` Gaussians.
+/// Returns the shape of a tensor of the geometry of `n` Gaussians, with `width` values for each Gaussian.
 pub(super) fn geometry_shape(n: usize, width: usize) -> Vec<usize> {
     if width == 1 { vec![n] } else { vec![n, width] }
 }

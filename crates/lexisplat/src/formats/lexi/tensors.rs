@@ -12,10 +12,10 @@ use crate::support::spill::{Spilled, Woven};
 #[cfg(target_endian = "big")]
 compile_error!("tensors are little-endian and written as they lie in memory");
 
-/// Words made at a time.
+/// Number of words made at a time.
 const BLOCK: usize = 1 << 14;
 
-/// What a file says of itself, by key.
+/// The metadata of a file, by key.
 pub(super) type Metadata = BTreeMap<&'static str, String>;
 
 /// One tensor to write.
@@ -28,30 +28,30 @@ pub(super) struct Tensor<'a> {
     sum: Sum,
 }
 
-/// Where the checksum of a tensor is.
+/// The place of the checksum of a tensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sum {
     /// In the metadata.
     Listed,
-    /// Wherever the meaning of the tensor says.
+    /// At a place that depends on the meaning of the tensor.
     Elsewhere,
-    /// In its own first four bytes, which come before those of the source: the checksum of the header and of the source.
-    /// There is no tensor with the checksum of the header then.
+    /// In the first four bytes of the tensor, which come before the bytes of the source. The checksum covers the
+    /// header and the source. The file then has no tensor with the checksum of the header.
     Sealed,
 }
 
-/// Bytes of a checksum.
+/// Number of bytes of a checksum.
 const SUM_BYTES: usize = 4;
 
-/// Makes the words of a tensor one after the other.
+/// A function that makes the words of a tensor one after the other.
 type Words<'a> = Box<dyn Fn() -> Box<dyn Iterator<Item = u32> + 'a> + 'a>;
 
-/// Where the bytes of a tensor come from.
+/// The source of the bytes of a tensor.
 pub(super) enum Source<'a> {
-    /// As they lie in memory.
+    /// Bytes as they lie in memory.
     Bytes(&'a [u8]),
     Spilled(Spilled),
-    /// Their checksums are elsewhere.
+    /// Spilled bytes in pieces. Their checksums are elsewhere.
     Woven(Woven),
     Owned(Vec<u8>),
     /// Words that are made twice: once for the checksum and once for the file.
@@ -71,18 +71,18 @@ impl std::fmt::Debug for Source<'_> {
 }
 
 impl<'a> Source<'a> {
-    /// `values` as they lie in memory.
+    /// Makes a source of `values` as they lie in memory.
     pub(super) fn of<T: bytemuck::NoUninit>(values: &'a [T]) -> Self {
         Self::Bytes(bytemuck::cast_slice(values))
     }
 
-    /// `crc` of its bytes too.
+    /// Returns `crc` with the bytes of the source added.
     fn hashed(&self, mut crc: crc32::Hasher) -> crc32::Hasher {
         match self {
             Self::Bytes(bytes) => crc.update(bytes),
             Self::Owned(bytes) => crc.update(bytes),
             Self::Woven(_) => {}
-            // Nothing is hashed before what was spilled.
+            // Spilled bytes are hashed first, so `crc` has no bytes before them.
             Self::Spilled(spilled) => crc = crc32::Hasher::new_with_initial(spilled.checksum),
             Self::Words(make) => {
                 // Hashing cannot fail.
@@ -105,12 +105,13 @@ impl<'a> Tensor<'a> {
         Self { name: name.to_owned(), dtype, shape: shape.to_vec(), source, sum: Sum::Listed }
     }
 
-    /// The same, with checksums that are elsewhere in the file.
+    /// Returns the tensor with checksums that are elsewhere in the file.
     pub(super) fn summed_elsewhere(self) -> Self {
         Self { sum: Sum::Elsewhere, ..self }
     }
 
-    /// The same of bytes, with the checksum of itself and of the header before them. Tensors before it are not wider.
+    /// Returns the tensor, which must be of bytes, with the checksum of itself and of the header before its bytes. No
+    /// tensor before it may be wider.
     pub(super) fn sealed(self) -> Self {
         Self { shape: vec![self.bytes() + SUM_BYTES], sum: Sum::Sealed, ..self }
     }
@@ -191,7 +192,7 @@ impl<'a> Draft<'a> {
         Self { header, header_checksum, tensors }
     }
 
-    /// Bytes of the length, the JSON and the header's checksum if no tensor holds it.
+    /// Returns the number of bytes of the length, the JSON, and the header's checksum unless a sealed tensor holds it.
     pub(super) fn header_bytes(&self) -> u64 {
         let is_sealed = self.tensors.iter().any(|tensor| tensor.sum == Sum::Sealed);
         (self.header.len() + if is_sealed { 0 } else { SUM_BYTES }) as u64
@@ -222,12 +223,12 @@ impl<'a> Draft<'a> {
     }
 }
 
-/// JSON of a value that cannot fail to serialise: strings, numbers, lists and maps of them.
+/// Returns the JSON of a value that cannot fail to serialise: strings, numbers, lists and maps of them.
 pub(super) fn json<T: serde::Serialize + ?Sized>(value: &T) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
-/// The metadata every file begins with.
+/// Returns the metadata that every file begins with.
 pub(super) fn preamble(format: &str, version: u64) -> Metadata {
     BTreeMap::from([
         (key::FORMAT, format.to_owned()),

@@ -1,4 +1,4 @@
-//! The first atoms, the replacement of useless ones, and the canonical form of a finished dictionary.
+//! The first atoms, the replacement of useless atoms, and the canonical form of a finished dictionary.
 
 use std::cmp::{Ordering, Reverse};
 
@@ -9,15 +9,16 @@ use super::update::{dot, normalised};
 use crate::sparse::atoms::Atoms;
 use crate::support::rng::SplitMix64;
 
-/// Two atoms whose |cos| is above this count as one (KSVD-Box, `muthresh`).
+/// Largest |cos| of two atoms that do not count as one (KSVD-Box, `muthresh`).
 const DUPLICATE_COS: f32 = 0.99;
-/// An atom with fewer users is replaced (KSVD-Box, `cleardict`).
+/// Number of users below which an atom is replaced (KSVD-Box, `cleardict`).
 const MIN_USERS: usize = 4;
 /// Largest |cos| of two first atoms, as long as enough dissimilar vectors can be found.
 const FIRST_COS: f32 = 0.9;
-/// Draws for each first atom that keep to [`FIRST_COS`], and draws altogether.
+/// Numbers of draws for each first atom: draws with the limit [`FIRST_COS`], and all draws. Further draws have the limit
+/// [`DUPLICATE_COS`].
 const DRAWS_PER_ATOM: [usize; 2] = [20, 40];
-/// Mixed into the seed, so that the first atoms do not depend on the sample's random numbers.
+/// Number mixed into the seed, so that the first atoms do not depend on the random numbers of the sample.
 const FIRST_STREAM: u64 = 0x46;
 
 fn direction(vector: &[f32]) -> Option<Vec<f32>> {
@@ -25,16 +26,17 @@ fn direction(vector: &[f32]) -> Option<Vec<f32>> {
     normalised(&wide)
 }
 
-/// Returns `atoms` unit vectors: principal axes, then directions of dissimilar random vectors of `sample`, then of any
-/// others, then coordinate axes, then random directions.
+/// Returns `atoms` unit vectors: principal axes, then directions of random vectors of `sample`, then coordinate axes, then
+/// random directions. Directions of vectors have a |cos| of at most [`FIRST_COS`] with the atoms before them, as long as
+/// enough of them are found, and of at most [`DUPLICATE_COS`] afterwards.
 ///
-/// Without the principal axes learning ends in worse optima. Vectors of the sample share their strongest directions,
-/// and the weak ones, which small tolerances need, would be found late or never.
+/// Without the principal axes, learning ends in worse optima. The vectors of the sample share their strongest directions.
+/// Weak directions, which small tolerances need, would be found late or never.
 pub(super) fn first_atoms(dim: usize, sample: &[f32], atoms: usize, options: &LearnOptions) -> Vec<f32> {
     let vectors = sample.len() / dim;
     let mut rng = SplitMix64::new(options.seed ^ FIRST_STREAM);
     let mut out: Vec<f32> = Vec::with_capacity(atoms * dim);
-    // At least half of the atoms are vectors of the sample, because axes alone do not tell vectors apart.
+    // At most half of the atoms are principal axes, because axes alone do not tell vectors apart.
     for axis in principal_axes(dim, sample).iter().take(atoms / 2) {
         out.extend(normalised(axis).into_iter().flatten());
     }
@@ -61,12 +63,13 @@ pub(super) fn first_atoms(dim: usize, sample: &[f32], atoms: usize, options: &Le
     out
 }
 
-/// Returns coordinate axis `axis`.
+/// Returns the unit vector of `dim` values along coordinate `axis`.
 pub(crate) fn unit_axis(dim: usize, axis: usize) -> impl Iterator<Item = f32> {
     (0..dim).map(move |d| if d == axis { 1.0 } else { 0.0 })
 }
 
-/// Returns the first `wanted` of `list` in the order of `compare`, or all if there are fewer. No two may be equal.
+/// Returns the first `wanted` items of `list` in the order of `compare`, or all items if there are fewer. No two items may
+/// be equal.
 pub(crate) fn take_first<T>(mut list: Vec<T>, wanted: usize, compare: impl Fn(&T, &T) -> Ordering) -> Vec<T> {
     if wanted > 0 && wanted < list.len() {
         list.select_nth_unstable_by(wanted - 1, &compare);
@@ -76,7 +79,10 @@ pub(crate) fn take_first<T>(mut list: Vec<T>, wanted: usize, compare: impl Fn(&T
     list
 }
 
-/// Replaces atoms with few users, and the less used of two similar atoms, by the vectors that cost most.
+/// Replaces useless atoms by the directions of the vectors that cost most, and sets the velocities of the new atoms to 0.
+///
+/// An atom is useless if it has fewer than [`MIN_USERS`] users. It is also useless if its |cos| with an atom that has more
+/// users, or with an earlier atom that has as many, is above [`DUPLICATE_COS`].
 pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training: &Training, vectors: &[f32]) {
     let dim = training.dim;
     let count = atoms.len() / dim;
@@ -91,11 +97,12 @@ pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training:
     if useless.is_empty() {
         return;
     }
-    // With a tolerance all residuals have about the same norm. A vector that the atoms fit badly has many nonzeros.
+    // Costs compare nonzeros first. With a tolerance, all residuals have about the same norm, but a vector that the atoms
+    // fit badly has many nonzeros.
     let costs: Vec<(Reverse<usize>, Reverse<u64>, usize)> = (0..training.len())
         .map(|i| {
             let residual = &training.residuals[i * dim..][..dim];
-            // Squared norms are not negative, so their bits have the same order.
+            // Squared norms are not negative, so their bits have the same order as the numbers.
             let error = f64::from(dot(residual, residual).max(0.0)).to_bits();
             (Reverse(training.starts[i + 1] - training.starts[i]), Reverse(error), i)
         })
@@ -109,7 +116,8 @@ pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training:
     }
 }
 
-/// Returns the atoms most used first, each with its largest entry positive.
+/// Returns the values of `atoms`, with the most used atom first. The entry of the largest absolute value of each atom is
+/// positive.
 pub(super) fn canonical(atoms: &Atoms, usage: &[usize]) -> Vec<f32> {
     let mut order: Vec<usize> = (0..atoms.len()).collect();
     order.sort_by_key(|&j| Reverse(usage[j]));

@@ -2,16 +2,16 @@
 
 use crate::scene::sh::MAX_REST;
 
-/// Most vectors that the axes are computed from.
+/// Largest number of vectors that the axes are computed from.
 const MAX_VECTORS: usize = 16_384;
-/// Passes over all pairs of coordinates. Convergence is quadratic, so few are needed.
+/// Number of passes over all pairs of coordinates. Convergence is quadratic, so few passes are needed.
 const SWEEPS: usize = 12;
-/// Largest correlation of two coordinates of which neither is rotated, in vectors longer than SH-rest. The passes that
-/// would only correct the rounding of earlier ones then cost next to nothing.
+/// Correlation below which two coordinates are not rotated, in vectors longer than SH-rest. Passes that would only correct
+/// the rounding of earlier passes then cost next to nothing.
 const UNCORRELATED: f64 = 1e-9;
 
-/// Returns the eigenvectors of the second moments of `sample` (about zero, not the mean), largest eigenvalue first. An
-/// empty sample has none.
+/// Returns the eigenvectors of the second moments of `sample` (about zero, not the mean), largest eigenvalue first. Only
+/// the first [`MAX_VECTORS`] vectors count. An empty sample has no eigenvectors.
 ///
 /// The method is cyclic Jacobi rotations in f64. A library would be faster, but these operations have a fixed order and
 /// rounding, so the result is the same on every machine.
@@ -31,7 +31,8 @@ pub(crate) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
     axes_of_moments(moments)
 }
 
-/// The principal axes of vectors of which these are the sums of products of coordinates, strongest first.
+/// Returns the principal axes of vectors, strongest first. `moments` are the sums of products of their coordinates: entry
+/// (i, j) is the sum of `x_i x_j`.
 pub(crate) fn axes_of_moments(mut moments: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let dim = moments.len();
     let mut axes: Vec<Vec<f64>> =
@@ -57,7 +58,7 @@ fn rotate(moments: &mut [Vec<f64>], axes: &mut [Vec<f64>], [p, q]: [usize; 2], u
     }
     let theta = (moments[q][q] - moments[p][p]) / (2.0 * off);
     let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-    // The moments are zero, or already diagonal up to rounding.
+    // The mixed moment is zero already, or no finite rotation makes it zero.
     if off == 0.0 || !tangent.is_finite() {
         return;
     }

@@ -1,4 +1,4 @@
-//! The rounds of learning: in stages of growing samples, until the held-out vectors gain no more.
+//! The rounds of learning. They run in stages of growing samples, until the score of the held-out vectors falls no more.
 
 use super::sample::{Fetch, Sample};
 use super::training::{self, Beyond, Training};
@@ -9,24 +9,25 @@ use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 use crate::support::progress::{Progress, Stage};
 
-/// Vectors for each atom in the first stage, which is the fastest. Each later stage has [`GROWTH`] times more.
+/// Number of vectors for each atom in the first stage, which is the fastest. Each later stage but the last has [`GROWTH`]
+/// times as many vectors as the stage before it.
 const FIRST_STAGE_PER_ATOM: usize = 48;
-/// Growth of the sample between stages.
+/// Factor by which the sample grows between stages.
 const GROWTH: usize = 4;
-/// Most rounds in the first stage, and in each later one.
+/// Largest number of rounds in the first stage, and in each later stage.
 const STAGE_ROUNDS: [usize; 2] = [150, 20];
-/// Rounds between evaluations on the held-out vectors.
+/// Number of rounds between evaluations on the held-out vectors.
 const EVALUATE_EVERY: usize = 5;
-/// An evaluation counts as progress if it lowers the held-out score by this share.
+/// Share by which an evaluation must lower the held-out score to count as progress.
 const MIN_GAIN: f64 = 1e-3;
-/// Rounds without momentum at the end of learning from rows that keep their nearest codes ([`Beyond::Nearest`]). There
-/// momentum swings about the best atoms instead of settling, since it acts on all of a row's error.
+/// Number of rounds without momentum at the end of learning from rows that keep their nearest codes ([`Beyond::Nearest`]).
+/// For such rows, momentum acts on all of a row's error. Atoms then swing about the best atoms instead of settling.
 const SETTLING_ROUNDS: usize = 10;
-/// Evaluations in a row without progress after which a stage still goes on.
+/// Largest number of evaluations in a row without progress after which a stage still goes on.
 const PATIENCE: u32 = 2;
 
-/// Learns atoms of `dim` values, from 1 to [`MAX_DIM`](crate::MAX_DIM), from `vectors` vectors, which `fetch` reads by
-/// number.
+/// Learns atoms of `dim` values from `vectors` vectors, which `fetch` reads by number. `dim` is from 1 to
+/// [`MAX_DIM`](crate::MAX_DIM).
 pub(super) fn learn(
     dim: usize,
     vectors: usize,
@@ -70,7 +71,7 @@ struct Learner<'a> {
     atoms: Atoms,
     /// The movement of each atom in the last round.
     velocity: Vec<f32>,
-    /// Lowest held-out score so far, and its atoms.
+    /// Lowest held-out score so far, and the atoms that have it.
     best: (f64, Atoms),
     rounds: usize,
 }
@@ -83,7 +84,8 @@ impl Learner<'_> {
         while let Some(&last) = sizes.last()
             && last < vectors
         {
-            // The last stage takes all vectors if they are less than twice as many as the next stage would take.
+            // The next stage takes all vectors, and is the last, if there are fewer than twice as many as it would
+            // otherwise take.
             let next = last * GROWTH;
             sizes.push(if next * 2 > vectors { vectors } else { next });
         }
@@ -92,7 +94,7 @@ impl Learner<'_> {
         progress.begin(Stage::Learn, most as u64);
         for (stage, size) in sizes.into_iter().enumerate() {
             let part = &self.sample.learn[..size * dim];
-            // Progress is counted anew, because a stage with more vectors may begin at a worse score.
+            // Each stage measures progress anew, because a stage with more vectors may begin at a worse score.
             let mut reference = f64::INFINITY;
             let mut patience = PATIENCE;
             for round in 1..=STAGE_ROUNDS[stage.min(1)] {
@@ -125,7 +127,7 @@ impl Learner<'_> {
         Ok(())
     }
 
-    /// Returns the score of the atoms, and keeps them if it is the lowest so far.
+    /// Returns the score of the atoms. Keeps the atoms if their score is the lowest so far.
     fn evaluate(&mut self) -> f64 {
         let score = self.score(&self.atoms);
         if score < self.best.0 {
@@ -149,7 +151,8 @@ impl Learner<'_> {
         Ok(())
     }
 
-    /// What learning minimises, on the validation vectors.
+    /// Returns the quantity that learning minimises, for `atoms` on the validation vectors. With a tolerance, it is the
+    /// mean nonzeros plus the cost of vectors beyond the tolerance. Otherwise it is the mean squared error.
     fn score(&self, atoms: &Atoms) -> f64 {
         let cost = training::cost(&self.coder(atoms), self.sample.validation(), self.beyond);
         match self.options.stop.tolerance() {
@@ -162,7 +165,7 @@ impl Learner<'_> {
         training::cost(&self.coder(atoms), &self.sample.held_out, self.beyond).nonzeros
     }
 
-    /// The best atoms, in an order and with signs that do not depend on the way it was found.
+    /// Returns the best atoms in an order and with signs that do not depend on the way in which the atoms were found.
     fn canonical(&self) -> Result<Atoms> {
         let best = &self.best.1;
         let training = Training::code(&self.coder(best), self.sample.validation(), self.beyond);

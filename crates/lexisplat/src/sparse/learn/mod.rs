@@ -1,9 +1,10 @@
-//! Learns a dictionary: codes a sample, refits the atoms to their users, repeats.
+//! Learns a dictionary: codes a sample, refits the atoms to their users, and repeats.
 //!
-//! One round is a pursuit with the tolerance of the final coding, followed by approximate K-SVD (Rubinstein et al.
-//! 2008), which refits each atom and the values of its users in turn. Each atom moves by its K-SVD step plus a share of
-//! its last movement. With this momentum, fewer rounds than plain K-SVD needs end at 2 to 3 % fewer nonzeros
-//! (docs/METHOD.md has the figures). The sample grows during learning, since early rounds need only the direction.
+//! One round is a pursuit with the tolerance of the final coding, followed by approximate K-SVD (Rubinstein et al. 2008),
+//! which refits each atom and the values of its users in turn. Each atom moves by its K-SVD step plus a share of its last
+//! movement. With this momentum, learning takes fewer rounds than plain K-SVD and ends at 2 to 3 % fewer nonzeros
+//! (docs/METHOD.md has the figures). The sample grows during learning, since early rounds need only the direction in which
+//! the atoms move.
 
 mod atom_replacement;
 mod axes;
@@ -32,37 +33,38 @@ pub use statistics::{ROWS_PER_BLOCK, Statistics};
 use training::Beyond;
 pub(crate) use update::ksvd_atom;
 
-/// Most vectors that a dictionary is learned from. On the real models tried, half as many gave the same mean nonzeros
-/// up to the differences between seeds (docs/METHOD.md).
+/// Default for the largest number of vectors that a dictionary is learned from. On the real models tried, half as many
+/// vectors gave the same mean nonzeros up to the differences between seeds (docs/METHOD.md).
 pub const DEFAULT_SAMPLE: usize = 65_536;
-/// Share of an atom's last movement that the next round keeps. Values from 0.8 to 0.97 give the same nonzeros; 0 gives
-/// 3 to 18 % more.
+/// Default share of an atom's last movement that the next round keeps. Shares from 0.8 to 0.97 give the same nonzeros; a
+/// share of 0 gives 3 to 18 % more.
 pub const DEFAULT_MOMENTUM: f32 = 0.9;
-/// Largest values of rows that are learned from as they are: squares of the norms of rows of
-/// [`MAX_DIM`](crate::MAX_DIM) values are then within what a pursuit in f32 takes.
+/// Range of the largest absolute value of rows that are learned from without scaling. The squared norm of a row of
+/// [`MAX_DIM`](crate::MAX_DIM) such values is within the range of a pursuit in f32.
 const IN_RANGE: RangeInclusive<f64> = 1e-12..=1e13;
 
-/// How to learn a dictionary.
+/// Options of learning a dictionary.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LearnOptions {
-    /// Number of atoms, 1 to [`MAX_ATOMS`](crate::MAX_ATOMS); `None` for twice the dimension, or as many as there may be.
+    /// Number of atoms, 1 to [`MAX_ATOMS`](crate::MAX_ATOMS); `None` for twice the dimension, but at most `MAX_ATOMS`.
     pub atoms: Option<usize>,
-    /// The pursuit that will code.
+    /// Pursuit that codes the vectors, in learning and in the final coding.
     pub pursuit: Pursuit,
-    /// When that pursuit will stop. With a tolerance, learning minimises mean nonzeros. With only a cap on nonzeros, it
-    /// minimises the squared error.
+    /// Stopping rule of the final coding. With a tolerance, learning minimises mean nonzeros and ignores a cap on nonzeros.
+    /// With only a cap on nonzeros, learning minimises the squared error.
     pub stop: StopRule,
     /// Seed of the sample and of the first atoms.
     pub seed: u64,
-    /// Most vectors to learn from.
+    /// Largest number of vectors to learn from.
     pub sample: usize,
     /// Share of an atom's last movement that the next round keeps, from 0 to below 1.
     pub momentum: f32,
 }
 
 impl LearnOptions {
-    /// The defaults for a stopping rule: OLS, seed 0, [`DEFAULT_SAMPLE`] vectors, twice as many atoms as dimensions.
+    /// Returns the defaults for a stopping rule: OLS, seed 0, [`DEFAULT_SAMPLE`] vectors, twice as many atoms as
+    /// dimensions.
     #[must_use]
     pub fn new(stop: StopRule) -> Self {
         Self {
@@ -133,7 +135,7 @@ pub fn learn(
     learn_from(degree, vectors, &mut in_memory(dim, signals), options, progress)
 }
 
-/// [`learn`] from `vectors` vectors, which `fetch` reads by number.
+/// Learns as [`learn`] does, from `vectors` vectors that `fetch` reads by number.
 pub(crate) fn learn_from(
     degree: ShDegree,
     vectors: usize,
@@ -152,14 +154,17 @@ pub(crate) fn learn_from(
 
 /// Learns atoms from `rows`, each of `dim` values, one after the other.
 ///
-/// This is [`learn`] for rows of any length, with two differences. A row that no code brings within the tolerance is not
-/// stored exactly but keeps the code that comes nearest ([`Visit::nearest`](crate::pursuit::Visit::nearest)). Atoms are
-/// therefore learned from such rows too, and few atoms for long rows lower their errors. Rows are learned from in f32; if
-/// they are too large or too small for that, they and the tolerance are scaled, which changes no atom. Learning ends with some rounds
-/// without momentum. `progress` is asked between rounds, but not while the first atoms are made, which takes half a
-/// minute for rows of 1024 values. Rows that
-/// [`LearnOptions::sample`] leaves out are checked but not learned from. Without any rows the atoms are unit axes, then
-/// random.
+/// This is [`learn`] for rows of any length, with two differences. First, a row that no code brings within the tolerance is
+/// not stored exactly but keeps the code that comes nearest ([`Visit::nearest`](crate::pursuit::Visit::nearest)). Atoms are
+/// therefore learned from such rows too, and few atoms for long rows lower the errors of the rows. Second, learning ends
+/// with some rounds without momentum.
+///
+/// Rows are learned from in f32. If they are too large or too small for f32, the rows and the tolerance are scaled, which
+/// changes no atom. Rows that [`LearnOptions::sample`] leaves out are checked but not learned from. Without any rows, the
+/// atoms are unit axes, then random directions.
+///
+/// `progress` is asked between rounds, but not while the first atoms are made. Making them takes half a minute for rows of 1024
+/// values.
 ///
 /// The result depends only on the arguments, not on threads or CPU.
 ///
@@ -187,7 +192,7 @@ pub fn learn_atoms<V: RowValue>(
     learn(&scaled, &LearnOptions { stop: options.stop.scaled(-exponent), ..options.clone() })
 }
 
-/// Fetches from `rows`, each of `dim` values.
+/// Returns a [`Fetch`] function that reads vectors of `rows`, each of `dim` values.
 fn in_memory(dim: usize, rows: &[f32]) -> impl FnMut(&[usize], &mut Vec<f32>) -> Result<()> {
     move |numbers, out| {
         numbers.iter().for_each(|&i| out.extend_from_slice(&rows[i * dim..(i + 1) * dim]));

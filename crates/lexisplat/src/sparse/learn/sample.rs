@@ -1,14 +1,14 @@
-//! Which vectors to learn from, and which to measure progress by.
+//! The choice of vectors to learn from, and of vectors to measure progress by.
 
 use super::LearnOptions;
 use crate::support::error::Result;
 use crate::support::rng::SplitMix64;
 
-/// Most vectors held out. The standard error of mean nonzeros is then about 0.1.
+/// Largest number of vectors held out. With so many, the standard error of mean nonzeros is about 0.1.
 const MAX_HELD_OUT: usize = 4096;
-/// One in so many vectors is held out, up to the maximum.
+/// One vector in this many is held out, up to [`MAX_HELD_OUT`] vectors.
 const HELD_OUT_SHARE: usize = 10;
-/// Mixed into the seed, so that the sample does not depend on the first atoms' random numbers.
+/// Number mixed into the seed, so that the sample does not depend on the random numbers of the first atoms.
 const SAMPLE_STREAM: u64 = 0x53;
 
 /// Two disjoint sets of vectors, in random order.
@@ -20,14 +20,14 @@ pub(super) struct Sample {
     pub(super) held_out: Vec<f32>,
 }
 
-/// Vectors fetched at a time.
+/// Number of vectors fetched at a time.
 const BATCH: usize = 4096;
 
-/// Appends the vectors with the given numbers, in the given order, to a list.
+/// A function that appends the vectors with the given numbers, in the given order, to a list.
 pub(crate) type Fetch<'a> = dyn FnMut(&[usize], &mut Vec<f32>) -> Result<()> + 'a;
 
 impl Sample {
-    /// Draws a sample of `vectors` vectors of length `dim`.
+    /// Draws a sample of `vectors` vectors, each of `dim` values.
     pub(super) fn draw(
         dim: usize,
         vectors: usize,
@@ -63,7 +63,8 @@ impl Sample {
         }
     }
 
-    /// The vectors to measure progress by: those held out, or all if the scene is too small to hold any out.
+    /// Returns the vectors to measure progress by: the held-out vectors, or the vectors to learn from if the scene is too
+    /// small to hold any out.
     pub(super) fn validation(&self) -> &[f32] {
         if self.held_out.is_empty() { &self.learn } else { &self.held_out }
     }

@@ -1,4 +1,4 @@
-//! Learning from rows of any length.
+//! Tests of learning from rows of any length.
 
 use super::{LearnOptions, LearnedAtoms, learn, learn_atoms};
 use crate::scene::sh::ShDegree;
@@ -11,7 +11,7 @@ use crate::support::limits::MAX_ATOMS;
 use crate::support::progress::{Progress, Silent};
 use crate::support::rng::SplitMix64;
 
-/// Rows that are sums of `nonzeros` of `atoms`, and a little noise.
+/// Returns rows that are sums of `nonzeros` of `atoms` and a little noise.
 pub(super) fn sparse_rows(atoms: &Atoms, nonzeros: usize, count: usize, rng: &mut SplitMix64) -> Vec<f32> {
     let mut rows = Vec::new();
     for _ in 0..count {
@@ -30,7 +30,7 @@ pub(super) fn tolerance(tolerance: f64) -> StopRule {
     StopRule::new(Some(tolerance), None).unwrap()
 }
 
-/// The mean nonzeros and the root of the mean squared error of `rows` over `atoms`.
+/// Returns the mean nonzeros and the root of the mean squared error of `rows` over `atoms`.
 pub(super) fn cost(atoms: &Atoms, rows: &[f32], stop: StopRule) -> [f64; 2] {
     let codes = encode_rows(&Coder::over(atoms, Pursuit::Ols, stop, ValueType::F32), rows, &Silent).unwrap();
     let count = codes.len() as f64;
@@ -94,7 +94,7 @@ fn arguments_are_checked() {
     assert!(refused(0, &[], &options).starts_with("dim = 0"));
     assert!(refused(MAX_DIM + 1, &[], &options).starts_with("dim = 1025"));
     assert!(refused(3, &[0.0; 4], &options).starts_with("rows = 4 values"));
-    // The row is within the sample's share that energy alone would leave out.
+    // The sample alone would leave out the row with a NaN, since its norm is not above the tolerance.
     assert!(refused(2, &[0.0, 1.0, f32::NAN, 0.0], &options).contains("row 1"));
     assert!(refused(2, &[], &options.clone().with_atoms(Some(0))).starts_with("atoms = 0"));
     assert!(refused(2, &[], &options.clone().with_atoms(Some(MAX_ATOMS + 1))).starts_with("atoms = 1025"));
@@ -131,7 +131,7 @@ fn atoms_of_any_length_are_learned() {
     }
 }
 
-/// Few atoms for long rows: no code reaches the tolerance, and still the atoms come to span what the rows span.
+/// With few atoms for long rows, no code reaches the tolerance. The atoms still come to span the space that the rows span.
 #[test]
 fn atoms_are_learned_from_rows_out_of_reach() {
     let mut rng = SplitMix64::new(34);

@@ -3,12 +3,12 @@
 use crate::sparse::pursuit::{Coder, Encoded, ROWS_PER_TASK};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
-/// What becomes of a vector that no code brings within the tolerance.
+/// Treatment of a vector that no code brings within the tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Beyond {
-    /// It is stored exactly. Atoms are not learned from it, and it costs as much as a code of full length.
+    /// The vector is stored exactly. Atoms are not learned from it, and it costs as much as a code of full length.
     Exact,
-    /// It keeps the code that comes nearest to it. Atoms are learned from that.
+    /// The vector keeps the code that comes nearest to it. Atoms are learned from this code.
     Nearest,
 }
 
@@ -16,7 +16,7 @@ pub(super) enum Beyond {
 #[derive(Debug, Default)]
 pub(super) struct Training {
     pub(super) dim: usize,
-    /// Start of each vector's entries, followed by the end of the last vector's.
+    /// Start of each vector's entries, followed by the end of the last vector's entries.
     pub(super) starts: Vec<usize>,
     /// Atom of each entry.
     pub(super) atoms: Vec<u16>,
@@ -29,9 +29,9 @@ pub(super) struct Training {
 /// One use of an atom.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Use {
-    /// The vector.
+    /// Number of the vector that uses the atom.
     pub(super) vector: usize,
-    /// The entry in [`Training::values`].
+    /// Index of the entry in [`Training::values`].
     pub(super) entry: usize,
 }
 
@@ -68,19 +68,19 @@ impl Training {
         all
     }
 
-    /// Number of vectors.
+    /// Returns the number of vectors.
     pub(super) fn len(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// Number of uses of each of `atoms` atoms.
+    /// Returns the number of uses of each of `atoms` atoms.
     pub(super) fn usage(&self, atoms: usize) -> Vec<usize> {
         let mut usage = vec![0; atoms];
         self.atoms.iter().for_each(|&atom| usage[usize::from(atom)] += 1);
         usage
     }
 
-    /// The uses of each of `atoms` atoms, by ascending vector.
+    /// Returns the uses of each of `atoms` atoms, by ascending vector.
     pub(super) fn uses(&self, atoms: usize) -> Vec<Vec<Use>> {
         let mut uses = vec![Vec::new(); atoms];
         for vector in 0..self.len() {
@@ -96,13 +96,13 @@ impl Training {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cost {
     pub(super) nonzeros: f64,
-    /// What vectors cost that stay beyond the tolerance, on top of their nonzeros and in the same unit. It grows with
-    /// their errors.
+    /// Additional cost of the vectors that stay beyond the tolerance, in the unit of `nonzeros`. It grows with the errors
+    /// of these vectors.
     pub(super) beyond: f64,
     pub(super) squared_error: f64,
 }
 
-/// Mean cost of coding `vectors`.
+/// Returns the mean cost of coding `vectors`.
 pub(super) fn cost(coder: &Coder, vectors: &[f32], beyond: Beyond) -> Cost {
     let dim = coder.dim();
     let count = vectors.len() / dim;
@@ -115,7 +115,8 @@ pub(super) fn cost(coder: &Coder, vectors: &[f32], beyond: Beyond) -> Cost {
             }
             // The vector is stored exactly, which costs as much as a code with all atoms.
             Encoded::Escape if beyond == Beyond::Exact => nonzeros += dim,
-            // At the tolerance this is as much as a code of full length, and more the further from it.
+            // An error as large as the tolerance adds the cost of a code of full length. Larger errors add more, in
+            // proportion.
             Encoded::Escape => {
                 let (code, error) = visit.nearest();
                 nonzeros += code.len();

@@ -3,27 +3,28 @@
 use super::training::Training;
 use crate::sparse::atoms::Atoms;
 
-/// Users whose residuals are summed in f32 before the sum goes on in f64.
+/// Number of users whose residuals are summed in f32 before their sum is added to the sum in f64.
 const PARTIAL: usize = 64;
 /// Number of partial sums of a dot product. It is fixed, so that results do not depend on the CPU.
 const PARTS: usize = 8;
-/// Shortest vector that has a direction.
+/// Norm that a vector must exceed to have a direction.
 const MIN_NORM: f64 = 1e-12;
 
-/// Scales `vector` to unit norm, unless its norm is not finite or not above `min_norm`.
+/// Returns `vector` scaled to unit norm; `None` if its norm is not finite or not above `min_norm`.
 pub(super) fn normalised_over(vector: &[f64], min_norm: f64) -> Option<Vec<f32>> {
     let norm = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     #[expect(clippy::cast_possible_truncation, reason = "atoms are f32")]
     (norm.is_finite() && norm > min_norm).then(|| vector.iter().map(|x| (x / norm) as f32).collect())
 }
 
-/// Scales `vector` to unit norm, unless its norm is not finite or not above [`MIN_NORM`].
+/// Returns `vector` scaled to unit norm; `None` if its norm is not finite or not above [`MIN_NORM`].
 pub(super) fn normalised(vector: &[f64]) -> Option<Vec<f32>> {
     normalised_over(vector, MIN_NORM)
 }
 
-/// Returns the new direction of `atom` in K-SVD: the normalised `sum + energy * atom`, where `sum` adds up the
-/// `g_i r_i` of its users and `energy` their `g_i^2`; `None` if its norm is not finite or not above `min_norm`.
+/// Returns the new direction of `atom` in K-SVD: the normalised `sum + energy * atom`. With values `g_i` and residuals
+/// `r_i` of the users of the atom, `sum` is the sum of `g_i r_i`, and `energy` is the sum of `g_i^2`. Returns `None` if the
+/// norm of `sum + energy * atom` is not finite or not above `min_norm`.
 pub(crate) fn ksvd_atom(mut sum: Vec<f64>, energy: f64, atom: &[f32], min_norm: f64) -> Option<Vec<f32>> {
     for (s, a) in sum.iter_mut().zip(atom) {
         *s += energy * f64::from(*a);
@@ -33,9 +34,9 @@ pub(crate) fn ksvd_atom(mut sum: Vec<f64>, energy: f64, atom: &[f32], min_norm: 
 
 /// Refits every atom in turn to its users' residuals, and the users' values to the new atom.
 ///
-/// Step j replaces atom `d` with users `i`, values `g_i` and residuals `r_i` by the normalised
-/// `sum_i g_i (r_i + g_i d)`, then each `g_i` by the projection of `r_i + g_i d` on it. Later atoms see
-/// the new residuals. Returns the new atoms; `training` is changed to match.
+/// Step j refits an atom `d` whose users `i` have values `g_i` and residuals `r_i`. It replaces `d` by the normalised
+/// `sum_i g_i (r_i + g_i d)`. It then replaces each `g_i` by the projection of `r_i + g_i d` on the new atom. Later steps
+/// see the new residuals. Returns the new atoms; `training` is changed to match.
 pub(super) fn refit(old: &Atoms, training: &mut Training) -> Vec<f32> {
     let dim = old.dim();
     let uses = training.uses(old.len());
@@ -75,8 +76,8 @@ pub(super) fn refit(old: &Atoms, training: &mut Training) -> Vec<f32> {
     atoms
 }
 
-/// Adds momentum to each of `atoms`. Its step from `old` plus `momentum` times its velocity becomes both its new
-/// velocity and the step that it takes.
+/// Adds momentum to `atoms`. The new velocity of an atom is its step from `old` plus `momentum` times its velocity. The
+/// atom becomes the normalised sum of its old value and the new velocity.
 pub(super) fn accelerate(old: &Atoms, atoms: &mut [f32], velocity: &mut [f32], momentum: f32) {
     let dim = old.dim();
     let moving = atoms.chunks_exact_mut(dim).zip(velocity.chunks_exact_mut(dim));
@@ -92,7 +93,7 @@ pub(super) fn accelerate(old: &Atoms, atoms: &mut [f32], velocity: &mut [f32], m
     }
 }
 
-/// Returns the dot product, summed in [`PARTS`] partial sums.
+/// Returns the dot product of `a` and `b`, summed in [`PARTS`] partial sums.
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; PARTS];
     let (a_chunks, b_chunks) = (a.chunks_exact(PARTS), b.chunks_exact(PARTS));
@@ -121,7 +122,7 @@ mod tests {
         (0..len).map(|_| f32::from(u16::try_from(rng.below(2001)).unwrap()) / 1000.0 - 1.0).collect()
     }
 
-    /// K-SVD lowers the squared error, and the residuals it maintains are those of the new atoms and values.
+    /// K-SVD lowers the squared error. The residuals in `training` become those of the new atoms and values.
     #[test]
     fn refit_lowers_the_error_and_keeps_residuals_true() {
         let degree = ShDegree::new(2).unwrap();

@@ -1,24 +1,24 @@
-//! A pursuit in f64, for the rows that the fast one in f32 leaves over the tolerance.
+//! A pursuit in f64, for the rows that the fast pursuit in f32 leaves over the tolerance.
 //!
-//! It takes the atoms that the fast pursuit took, in their order, and refits their values at every step, so that it ends at
-//! the first of them with which the row is within the tolerance. After those it chooses further atoms by itself. Only what
-//! lies outside the span of all atoms is then left, so a row that stays over the tolerance has no code within it, unless the
-//! number of nonzeros is capped.
+//! It first takes the atoms that the fast pursuit took, in the same order. Their values are refitted at every step, and the
+//! pursuit ends at the first atom with which the row is within the tolerance. After these atoms, it chooses further atoms
+//! by itself. In the end, the residual is only the part of the row outside the span of all atoms. A row that stays over the
+//! tolerance therefore has no code within it, unless the number of nonzeros is capped.
 //!
-//! Rows are scaled by a power of two to values below 1, so rows of any size have the same codes but for that factor.
+//! Rows are scaled by a power of two to values below 1, so that rows of any size have the same codes up to that factor.
 
 use super::ValueType;
 use super::engine::Coder;
 use crate::sparse::model::Pursuit;
 use crate::sparse::row_value::RowValue;
 
-/// An atom whose squared distance to the chosen span is below this counts as part of the span. Two atoms that differ at all
-/// in f32 are farther apart.
+/// Squared distance to the chosen span below which an atom counts as part of the span. Two atoms that differ at all in f32
+/// are farther apart.
 const MIN_SPAN_DISTANCE: f64 = 1e-16;
-/// An atom that lowers the squared residual by no more than this share of the row's energy would only add rounding noise of
-/// f64.
+/// Share of the row's energy. An atom that lowers the squared residual by no more than this share would only add rounding
+/// noise of f64.
 const NOISE_GAIN: f64 = 1e-30;
-/// Partial sums of an inner product, so that additions need not wait for each other.
+/// Number of partial sums of an inner product. With several sums, additions need not wait for each other.
 const SUMS: usize = 8;
 
 /// The atoms of a coder in f64.
@@ -35,29 +35,29 @@ pub(super) struct Careful<'a> {
 pub(super) struct Work {
     /// The row, scaled.
     row: Vec<f64>,
-    /// What the chosen atoms leave of it.
+    /// The residual of the row over the chosen atoms.
     residual: Vec<f64>,
     /// Orthonormal directions of the chosen span, one after the other.
     basis: Vec<f64>,
-    /// Coordinates of each chosen atom in the basis. The first atom has one, the second two, and so on.
+    /// Coordinates of each chosen atom in the basis. The first atom has one coordinate, the second two, and so on.
     triangle: Vec<f64>,
     /// Coordinates of the row in the basis.
     amplitudes: Vec<f64>,
     /// The chosen atoms, in order.
     chosen: Vec<u16>,
-    /// Whether each atom is chosen, or was found in the span.
+    /// For each atom, whether it is chosen or was found to be in the span.
     taken: Vec<bool>,
     /// Squared distance of every atom to the span of the first `measured` directions.
     distances: Vec<f64>,
     measured: usize,
-    /// An atom on its way into the basis, or a row on its way back.
+    /// Scratch space for an atom on its way into the basis, or for the residual of a row.
     scratch: Vec<f64>,
 }
 
 /// A code, and the un-squared L2 norm of its error.
 #[derive(Debug)]
 pub(super) struct Found<T> {
-    /// (atom, value) pairs by ascending atom.
+    /// Pairs (atom, value), by ascending atom.
     pub(super) code: Vec<(u16, T)>,
     pub(super) error: f64,
 }
@@ -72,7 +72,8 @@ impl<'a> Careful<'a> {
         &self.atoms[j * self.dim..(j + 1) * self.dim]
     }
 
-    /// The un-squared L2 norm of the error of `code`, with values times atoms summed in f64 in order of the pairs.
+    /// Returns the un-squared L2 norm of the error of `code`. Values times atoms are subtracted in f64, in the order of the
+    /// pairs.
     pub(super) fn error<T: RowValue>(&self, row: &[T], code: &[(u16, T)], work: &mut Work) -> f64 {
         let left = &mut work.scratch;
         left.clear();
@@ -83,8 +84,8 @@ impl<'a> Careful<'a> {
         dot(left, left).sqrt()
     }
 
-    /// Codes `row`, beginning with the atoms `first`. If no code is within the tolerance, the one that comes nearest is
-    /// returned, which is empty if no error is below the row's norm.
+    /// Codes `row`, beginning with the atoms `first`. If no code is within the tolerance, returns the nearest code found.
+    /// This code is empty if no error is below the row's norm.
     pub(super) fn code<T: RowValue>(&self, row: &[T], first: &[u16], work: &mut Work) -> Found<T> {
         let largest = row.iter().map(|x| x.wide().abs()).fold(0.0, f64::max);
         let (_, exponent) = libm::frexp(largest);
@@ -102,7 +103,7 @@ impl<'a> Careful<'a> {
                 if next.error < found.error {
                     found = next;
                 }
-                // Rounding may have raised the error above the tolerance. Then more atoms may lower it.
+                // Rounding may have raised the error above the tolerance. More atoms may then lower the error.
                 if is_last || found.error <= promise || !self.take_next(&mut first, norm, work) {
                     break;
                 }
@@ -111,20 +112,20 @@ impl<'a> Careful<'a> {
         Found { error: libm::scalbn(found.error, exponent), ..found }
     }
 
-    /// Takes one more atom, of `first` or else the one that helps most. Returns whether there was one.
+    /// Takes one more atom: the next of `first`, or else the atom that helps most. Returns whether there was such an atom.
     fn take_next(&self, first: &mut std::slice::Iter<'_, u16>, norm: f64, work: &mut Work) -> bool {
         loop {
             let next = first.next().map(|&atom| usize::from(atom)).or_else(|| self.best(norm, work));
             match next {
                 None => return false,
                 Some(atom) if self.take(atom, work) => return true,
-                // It is in the span, and will not be chosen again.
+                // The atom is in the span, and is not chosen again.
                 Some(_) => {}
             }
         }
     }
 
-    /// The atom that lowers the residual most by the rule of the pursuit, if any does.
+    /// Returns the atom that lowers the residual most by the rule of the pursuit; `None` if no atom lowers it.
     fn best(&self, norm: f64, work: &mut Work) -> Option<usize> {
         let Work { basis, distances, measured, taken, residual, .. } = work;
         if self.coder.pursuit() == Pursuit::Ols {
@@ -151,7 +152,7 @@ impl<'a> Careful<'a> {
         best.1
     }
 
-    /// Adds `atom` to the basis. Returns `false` if it is in the span, or was taken before.
+    /// Adds `atom` to the basis. Returns `false` if the atom is in the span, or was taken before.
     fn take(&self, atom: usize, work: &mut Work) -> bool {
         if std::mem::replace(&mut work.taken[atom], true) {
             return false;
@@ -160,7 +161,7 @@ impl<'a> Careful<'a> {
         new.clear();
         new.extend_from_slice(self.atom(atom));
         work.triangle.resize(begin + work.chosen.len(), 0.0);
-        // A second projection removes what rounding left in the first.
+        // The second projection removes the part that rounding left in the first.
         for _ in 0..2 {
             let directions = work.basis.chunks_exact(self.dim);
             for (coordinate, direction) in work.triangle[begin..].iter_mut().zip(directions) {
@@ -186,8 +187,9 @@ impl<'a> Careful<'a> {
         true
     }
 
-    /// The least-squares values of the chosen atoms as they are stored, times two to the power `exponent`. Each value is
-    /// rounded before the next is solved for, which so makes up for what rounding changed.
+    /// Returns the code with the least-squares values of the chosen atoms, and its error. The values are those of the
+    /// scaled row, times two to the power `exponent`, rounded as they are stored. The error is that of the scaled row. Each
+    /// value is rounded before the next value is solved for, so that the next value makes up for the rounding.
     fn solve<T: RowValue>(&self, exponent: i32, work: &mut Work) -> Found<T> {
         let mut right = work.amplitudes.clone();
         let mut code = Vec::with_capacity(right.len());
@@ -210,7 +212,7 @@ impl<'a> Careful<'a> {
         Found { code, error: dot(left, left).sqrt() }
     }
 
-    /// `value` as it is stored.
+    /// Returns `value` rounded as it is stored.
     fn rounded<T: RowValue>(&self, value: f64) -> T {
         T::nearest(match self.coder.value_type() {
             ValueType::F16 => half::f16::from_f64(value).to_f64(),
@@ -237,7 +239,7 @@ impl Work {
     }
 }
 
-/// The inner product of `a` and `b`, in fixed partial sums.
+/// Returns the inner product of `a` and `b`, in fixed partial sums.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; SUMS];
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<SUMS>(), b.as_chunks::<SUMS>());

@@ -11,20 +11,22 @@ use crate::sparse::model::Pursuit;
 use crate::support::error::{Error, Result};
 use crate::support::simd::Simd;
 
-/// Codes stay below the tolerance by this share of it, so that a reader who sums the squares in another order agrees.
+/// Share of the tolerance by which errors of codes stay below it. A reader who sums the squares in another order then
+/// agrees that the errors are within the tolerance.
 const PROMISE_MARGIN: f64 = 1e-12;
 /// Largest squared norm of a vector that is coded. Above it, f32 squares of correlations could overflow.
 const MAX_ENERGY: f64 = 1e30;
-/// Below this squared norm f32 squares of correlations lose their digits. Such vectors are coded if the tolerance is as
-/// small, and badly; rows are then coded in f64.
+/// Squared norm below which f32 squares of correlations lose their digits. Smaller vectors are coded if the tolerance is as
+/// small, but coded badly. Rows of this size are coded in f64.
 pub(super) const MIN_ENERGY: f64 = 1e-24;
-/// Below this share of the signal's energy the f32 residual is rounding noise, and more atoms would not help.
+/// Share of the signal's energy below which the f32 residual is rounding noise, so that more atoms would not help.
 const NOISE_FLOOR: f64 = 1e-12;
 
-/// Lanes of a per-atom array of the paper's dictionary, 90 atoms. Loops of a length known to the compiler are faster.
+/// Number of lanes of a per-atom array for the paper's dictionary of 90 atoms. Loops of a length known to the compiler are
+/// faster.
 const DEFAULT_BLOCKS: usize = blocks_of(90);
 
-/// When a pursuit ends: at a tolerance or at a number of atoms, whichever comes first.
+/// The rule by which a pursuit ends: at a tolerance or at a number of atoms, whichever comes first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopRule {
     tolerance: Option<f64>,
@@ -32,7 +34,8 @@ pub struct StopRule {
 }
 
 impl StopRule {
-    /// Stops at the un-squared L2 norm `tolerance` of the error, at `max_nonzeros` atoms, or both.
+    /// Creates a rule that stops at the un-squared L2 norm `tolerance` of the error, at `max_nonzeros` atoms, or at
+    /// whichever comes first.
     ///
     /// # Errors
     /// [`Error::Parameter`] if both are missing, or if the tolerance is not finite or not above 0.
@@ -48,19 +51,19 @@ impl StopRule {
         Ok(Self { tolerance, max_nonzeros })
     }
 
-    /// The tolerance, if any.
+    /// Returns the tolerance, if any.
     #[must_use]
     pub fn tolerance(&self) -> Option<f64> {
         self.tolerance
     }
 
-    /// The rule for vectors that are scaled by two to the power `exponent`.
+    /// Returns the rule for vectors that are scaled by two to the power `exponent`.
     pub(crate) fn scaled(self, exponent: i32) -> Self {
         let scaled = |tolerance| libm::scalbn(tolerance, exponent).clamp(f64::MIN_POSITIVE, f64::MAX);
         Self { tolerance: self.tolerance.map(scaled), ..self }
     }
 
-    /// The rule without the cap; unchanged if it has no tolerance.
+    /// Returns the rule without the cap on nonzeros; unchanged if it has no tolerance.
     #[must_use]
     pub fn without_cap(self) -> Self {
         Self { max_nonzeros: if self.tolerance.is_some() { None } else { self.max_nonzeros }, ..self }
@@ -70,12 +73,12 @@ impl StopRule {
 /// Outcome of coding one vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Encoded {
-    /// A code was found; its error in f64 on the values a decoder reconstructs.
+    /// A code was found. Its error is computed in f64 from the values that a decoder reconstructs.
     Code {
         /// Un-squared L2 norm of the error.
         error: f64,
     },
-    /// No code reaches the tolerance: the vector must be stored exactly.
+    /// No code reaches the tolerance, so the vector must be stored exactly.
     Escape,
 }
 
@@ -84,8 +87,8 @@ pub enum Encoded {
 pub struct Visit<'a> {
     /// The vector.
     pub signal: &'a [f32],
-    /// Its (atom, value) pairs by ascending atom. Values are already rounded. An escape has those that the pursuit ended
-    /// with, of which [`Self::nearest`] tells whether they are of use.
+    /// The pairs (atom, value) of the code, by ascending atom. Values are already rounded. An escape has the pairs that the
+    /// pursuit ended with; [`Self::nearest`] tells whether they are of use.
     pub code: &'a [(u16, f32)],
     /// The outcome.
     pub outcome: Encoded,
@@ -95,14 +98,15 @@ pub struct Visit<'a> {
 }
 
 impl Visit<'_> {
-    /// The vector that a decoder reconstructs from the code.
+    /// Returns the vector that a decoder reconstructs from the code.
     #[must_use]
     pub fn reconstruction(&self) -> &[f32] {
         &self.reconstruction[..self.signal.len()]
     }
 
-    /// The code that comes nearest to the vector, and the un-squared L2 norm of its error: that of [`Encoded::Code`],
-    /// or else the one that the pursuit ended with. The latter is empty if its error is not below the vector's norm.
+    /// Returns the code that comes nearest to the vector, and the un-squared L2 norm of its error. This is the code of
+    /// [`Encoded::Code`]. For an escape, it is the code that the pursuit ended with, or an empty code if the error of that
+    /// code is not below the vector's norm.
     #[must_use]
     pub fn nearest(&self) -> (&[(u16, f32)], f64) {
         if let Encoded::Code { error } = self.outcome {
@@ -138,7 +142,7 @@ impl<F: FnMut(Visit<'_>), const BLOCKS: usize> pulp::NullaryFnOnce for Job<'_, F
     }
 }
 
-/// Codes vectors over one set of atoms. Threads can share it, since each call has its own working memory.
+/// A coder of vectors over one set of atoms. Threads can share a coder, since each call has its own working memory.
 #[derive(Debug)]
 pub struct Coder {
     plan: Plan,
@@ -160,30 +164,30 @@ impl Coder {
         Self { plan: Plan::new(atoms), pursuit, stop, values }
     }
 
-    /// Values of a vector.
+    /// Returns the number of values of a vector.
     #[must_use]
     pub fn dim(&self) -> usize {
         self.plan.dim
     }
 
-    /// Number of atoms.
+    /// Returns the number of atoms.
     #[must_use]
     pub fn atoms(&self) -> usize {
         self.plan.atoms
     }
 
-    /// The tolerance at which it stops, if any.
+    /// Returns the tolerance at which the pursuit stops, if any.
     #[must_use]
     pub fn tolerance(&self) -> Option<f64> {
         self.stop.tolerance
     }
 
-    /// The largest error that counts as within the tolerance; 0 without a tolerance.
+    /// Returns the largest error that counts as within the tolerance; 0 without a tolerance.
     pub(super) fn promise(&self) -> f64 {
         self.stop.tolerance.map_or(0.0, |t| t * (1.0 - PROMISE_MARGIN))
     }
 
-    /// The cap on nonzeros, if any.
+    /// Returns the cap on nonzeros, if any.
     pub(super) fn max_nonzeros(&self) -> Option<usize> {
         self.stop.max_nonzeros
     }
@@ -196,7 +200,7 @@ impl Coder {
         self.values
     }
 
-    /// The values of atom `j`.
+    /// Returns the values of atom `j`.
     pub(super) fn atom(&self, j: usize) -> impl Iterator<Item = f32> {
         self.plan.atom(j)
     }
@@ -243,8 +247,8 @@ impl Coder {
         let target = (promise * promise).max(energy * NOISE_FLOOR);
         self.plan.start::<BLOCKS>(s, signal, energy);
         loop {
-            // Each time round takes at least one more atom. The recurrence was too optimistic, or rounding to the value
-            // type raised the error above the tolerance.
+            // Each pass takes at least one more atom. A further pass follows if the recurrence was too optimistic, or if
+            // rounding to the value type raised the error above the tolerance.
             let mut exhausted = false;
             loop {
                 exhausted |= s.len >= cap || !self.plan.step::<BLOCKS>(s, self.pursuit);

@@ -5,12 +5,12 @@ use crate::scene::sh::MAX_REST;
 use crate::sparse::atoms::Atoms;
 use crate::sparse::model::Pursuit;
 
-/// An atom whose squared distance to the chosen span is below this counts as part of the span, because the f32
-/// recurrences hold only noise about its direction.
+/// Squared distance to the chosen span below which an atom counts as part of the span. The f32 recurrences hold only noise
+/// about the direction of such an atom.
 const MIN_SPAN_DISTANCE: f32 = 1e-5;
-/// Stands for any number of lanes, where a constant number makes loops faster.
+/// The value of `BLOCKS` that stands for any number of lanes. A number of lanes that is constant makes loops faster.
 pub(super) const ANY: usize = 0;
-/// Lanes of the longest atoms of a dictionary. The lanes of longer atoms are summed in groups of so many.
+/// Number of lanes of the longest atoms of a dictionary. The lanes of longer atoms are summed in groups of this many.
 const MOST_BLOCKS: usize = MAX_REST.div_ceil(LANES);
 /// A lane of ones.
 const ONES: Lane = Lane([1.0; LANES]);
@@ -18,9 +18,9 @@ const ONES: Lane = Lane([1.0; LANES]);
 /// Atoms prepared for pursuit: their transpose, their Gram matrix, and padded atoms.
 #[derive(Debug)]
 pub(super) struct Plan {
-    /// Lanes of one per-atom array.
+    /// Number of lanes of one per-atom array.
     blocks: usize,
-    /// Lanes of one atom.
+    /// Number of lanes of one atom.
     atom_blocks: usize,
     pub(super) dim: usize,
     /// Number of atoms.
@@ -42,7 +42,7 @@ pub(super) struct Scratch {
     distances: Vec<Lane>,
     /// Row k: inner products of every atom with the k-th orthonormal direction.
     directions: Vec<Lane>,
-    /// Column l: coordinates of the l-th chosen atom in the orthonormal basis, without its last one.
+    /// Column l: coordinates of the l-th chosen atom in the orthonormal basis, without the last coordinate.
     triangle: Vec<f32>,
     /// Last coordinate of each chosen atom.
     diagonal: Vec<f32>,
@@ -69,8 +69,8 @@ impl Plan {
             for (d, &value) in atom.iter().enumerate() {
                 padded[j * atom_blocks + d / LANES].0[d % LANES] = value;
             }
-            // Products are summed in f64 and rounded once, unlike those of `packed::codebook`: that codec sums them in
-            // f32, which costs it nothing, and its files depend on it.
+            // Products are summed in f64 and rounded once. `packed::codebook` sums its products in f32 instead, which costs
+            // that codec nothing, and its files depend on it.
             for i in 0..count {
                 let product: f64 =
                     atom.iter().zip(atoms.atom(i)).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum();
@@ -90,18 +90,18 @@ impl Plan {
         }
     }
 
-    /// Lanes of one per-atom array, `BLOCKS` unless that is [`ANY`].
+    /// Returns the number of lanes of one per-atom array, which is `BLOCKS` unless that is [`ANY`].
     #[inline(always)]
     fn blocks<const BLOCKS: usize>(&self) -> usize {
         if BLOCKS == ANY { self.blocks } else { BLOCKS }
     }
 
-    /// Whether every per-atom array has `blocks` lanes.
+    /// Returns whether every per-atom array has `blocks` lanes.
     pub(super) fn has_blocks(&self, blocks: usize) -> bool {
         self.blocks == blocks
     }
 
-    /// The values of atom `j`.
+    /// Returns the values of atom `j`.
     pub(super) fn atom(&self, j: usize) -> impl Iterator<Item = f32> {
         let lanes = &self.padded[j * self.atom_blocks..(j + 1) * self.atom_blocks];
         lanes.iter().flat_map(|lane| lane.0).take(self.dim)
@@ -143,7 +143,7 @@ impl Plan {
         }
         let Some(best) = (match pursuit {
             Pursuit::Ols => best_ratio(&s.correlations, s.distances.iter()),
-            // The largest correlation alone. Atoms in the span have 0.
+            // OMP looks at the correlation alone. Atoms in the span have a correlation of 0.
             Pursuit::Omp => best_ratio(&s.correlations, std::iter::repeat(&ONES)),
         }) else {
             return false;
@@ -160,8 +160,8 @@ impl Plan {
         let new = &mut new[..blocks];
         let gram = &self.gram[best * blocks..(best + 1) * blocks];
         accumulate(new, |block| gram[block], column, previous, |sum, c, u| sum - c * u);
-        // The chosen atom is in the span now. Because of rounding, the recurrence alone might not tell. The whole lane is
-        // written, since a processor waits long to read a lane of which it has just written a part.
+        // The chosen atom is in the span now, which the recurrence alone might not show because of rounding. The whole lane
+        // is written, since a processor waits long to read a lane of which it has just written a part.
         let chosen = Lane(std::array::from_fn(|i| if i == lane { f32::INFINITY } else { 0.0 }));
         distances[block] = distances[block].zip(chosen, |n, chosen| n - chosen);
         let inverse = 1.0 / length;
@@ -183,7 +183,7 @@ impl Plan {
         true
     }
 
-    /// Least-squares coefficients of the chosen atoms, by ascending atom, into `code`.
+    /// Writes the least-squares coefficients of the chosen atoms to `code`, by ascending atom.
     #[inline(always)]
     pub(super) fn solve(&self, s: &mut Scratch, code: &mut Vec<(u16, f32)>) {
         let k = s.len;
@@ -197,7 +197,8 @@ impl Plan {
             for (r, &c) in right[..l].iter_mut().zip(column) {
                 *r -= c * value;
             }
-            // The place of an atom is the number of chosen ones before it. No branch depends on the atoms.
+            // The place of an atom in `code` is the number of chosen atoms below it. The count has no branch that depends
+            // on the atoms.
             let atom = s.chosen[l];
             let before: u16 = s.chosen[..k].iter().map(|&other| u16::from(other < atom)).sum();
             code[usize::from(before)] = (atom, value);
@@ -238,7 +239,7 @@ impl Plan {
     }
 }
 
-/// Returns the sum of squared differences in f64, in eight fixed partial sums. `b` may be longer than `a`.
+/// Returns the sum of squared differences of `a` and `b` in f64, in eight fixed partial sums. `b` may be longer than `a`.
 #[inline(always)]
 pub(super) fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
     const PARTS: usize = 8;
@@ -258,17 +259,18 @@ pub(super) fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
     ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]))
 }
 
-/// Returns the atom with the largest `correlation^2 / distance`, which lowers the residual most, if that is above 0.
+/// Returns the atom with the largest `correlation^2 / distance`, which lowers the residual most; `None` if no quotient is
+/// above 0.
 ///
-/// Lanes compare by cross-multiplication, which is cheaper than a division for every entry.
+/// Quotients are compared by cross-multiplication, which is cheaper than a division for every entry.
 #[inline(always)]
 fn best_ratio<'a>(correlations: &[Lane], distances: impl Iterator<Item = &'a Lane>) -> Option<usize> {
     let mut gains = [0.0_f32; LANES];
     let mut spans = [1.0_f32; LANES];
     let mut blocks = [0_u32; LANES];
     for (number, (r, n)) in (0_u32..).zip(correlations.iter().zip(distances)) {
-        // Masks instead of conditions: the compiler would make writes to memory of those, which the next lane waits
-        // for.
+        // The loop uses masks instead of conditions. The compiler would turn conditions into writes to memory, which the
+        // next lane waits for.
         for i in 0..LANES {
             let gain = r.0[i] * r.0[i];
             let better = if gain * spans[i] > gains[i] * n.0[i] { u32::MAX } else { 0 };

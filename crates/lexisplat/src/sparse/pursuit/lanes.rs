@@ -1,11 +1,11 @@
 //! Per-atom arrays in lanes of fixed width, and the loops over them that both pursuits share.
 //!
-//! The pursuit of the exact codec is [`super::greedy`], that of the packed codec `packed::codebook`.
+//! The pursuit of the exact codec is [`super::greedy`]. The pursuit of the packed codec is `packed::codebook`.
 
-/// Atoms handled together; the padding unit of every per-atom array. The width is fixed, so that results do not depend
-/// on the width of the CPU's registers.
+/// Number of atoms handled together, and the padding unit of every per-atom array. The number is fixed, so that results do
+/// not depend on the width of the CPU's registers.
 pub(crate) const LANES: usize = 16;
-/// Lanes that [`accumulate`] keeps in registers at once: as many as fit, and what is used for the rest.
+/// Numbers of lanes that [`accumulate`] keeps in registers at once: as many as fit, and fewer for the lanes that remain.
 const LARGE: usize = 6;
 const SMALL: usize = 2;
 
@@ -37,12 +37,13 @@ impl Lane {
     }
 }
 
-/// Number of lanes of an array with an entry for each of `atoms`.
+/// Returns the number of lanes of an array with an entry for each of `atoms`.
 pub(crate) const fn blocks_of(atoms: usize) -> usize {
     atoms.div_ceil(LANES)
 }
 
-/// Transposes `atoms`, each `dim` long: `dim` rows of lanes, in which entry (d, j) is coefficient d of atom j.
+/// Returns the transpose of `atoms`, each of `dim` values: `dim` rows of lanes, in which entry (d, j) is coefficient d of
+/// atom j.
 pub(crate) fn transposed(dim: usize, atoms: &[f32]) -> Vec<Lane> {
     let blocks = blocks_of(atoms.len().checked_div(dim).unwrap_or(0));
     let mut out = vec![ZERO; dim * blocks];
@@ -54,8 +55,9 @@ pub(crate) fn transposed(dim: usize, atoms: &[f32]) -> Vec<Lane> {
     out
 }
 
-/// Writes to `sums` what becomes of the lanes that `from` returns when `factors[l]` and row l of `rows` are folded into
-/// them, in order of l. Each row is as long as `sums`.
+/// Folds `rows` into lanes and writes the lanes to `sums`. Lane b begins as `from(b)`. For each l in order,
+/// `f(entry, factors[l], x)` replaces every entry, where `x` is the entry at the same place in row l. Each row is as long
+/// as `sums`.
 ///
 /// Each group of lanes stays in registers for all of `factors`.
 #[inline(always)]
@@ -91,7 +93,7 @@ fn accumulate_group<const GROUP: usize>(
     f: impl Fn(f32, f32, f32) -> f32 + Copy,
 ) {
     let blocks = sums.len();
-    // Arrays of constant length stay in registers, and the loop over them needs no bounds checks.
+    // Arrays of constant length stay in registers, and loops over them need no bounds checks.
     let Some(sums) = sums[first..].first_chunk_mut::<GROUP>() else { return };
     let mut group: [Lane; GROUP] = std::array::from_fn(|g| from(first + g));
     let mut rows = &rows[first.min(rows.len())..];
@@ -102,14 +104,14 @@ fn accumulate_group<const GROUP: usize>(
                 group[g].0[i] = f(group[g].0[i], factor, row[g].0[i]);
             }
         }
-        // Nothing follows the last row but, perhaps, the end of that row.
+        // Of the last row, only the lanes from `first` on are left, which may be fewer than `blocks`.
         rows = rows.get(blocks..).unwrap_or_default();
     }
     *sums = group;
 }
 
-/// Returns the largest of `values` and the atom of the first lane that holds it, where `blocks` says which block each
-/// lane's value is from; `None` if a NaN hides the maximum.
+/// Returns the largest of `values` and the atom of the first lane that holds it. `blocks` has the block that the value of
+/// each lane is from. Returns `None` if a NaN hides the maximum.
 #[inline(always)]
 pub(crate) fn first_maximum(values: &[f32; LANES], blocks: &[u32; LANES]) -> Option<(f32, usize)> {
     let mut fold = *values;

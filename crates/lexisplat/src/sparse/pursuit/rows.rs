@@ -11,24 +11,27 @@ use crate::support::error::Result;
 use crate::support::parallel::map_chunks;
 use crate::support::progress::{Progress, Stage};
 
-/// Rows coded before their codes are appended. It bounds the codes that are in memory twice.
+/// Number of rows that are coded before their codes are appended. It bounds the codes that are in memory twice.
 const AT_ONCE: usize = 256 * ROWS_PER_TASK;
 
-/// Sparse codes of rows, with values of the type of the rows.
+/// Sparse codes of rows. Values have the type of the rows.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct RowCodes<V = f32> {
-    /// Where the pairs of each row start, and where those of the last row end: one entry more than there are rows.
+    /// Start of the pairs of each row, followed by the end of the last row's pairs. There is one entry more than there are
+    /// rows.
     pub starts: Vec<usize>,
     /// The atom of each pair. Atoms ascend within a row.
     pub atoms: Vec<u16>,
-    /// The value of each pair. A coder of 16-bit values rounds them to 16 bits; others do not round rows of `f64`.
+    /// The value of each pair. A coder of 16-bit values rounds them to 16 bits. Other coders do not round values that they
+    /// compute in f64 for rows of `f64`.
     pub values: Vec<V>,
-    /// The un-squared L2 norm of each row's error: of what the sum of its values times atoms, taken in f64, leaves of it.
+    /// The un-squared L2 norm of each row's error, which is the row minus the sum of its values times atoms, taken in f64.
     pub errors: Vec<f64>,
-    /// The numbers of the rows that no code brings within the tolerance, ascending. They have the pairs that come nearest,
-    /// which may be none. The error of such a row is the norm of what lies outside the span of all atoms, or what rounding
-    /// of values leaves. Rows that end at a cap on nonzeros are not among them; their errors tell.
+    /// Numbers of the rows that no code brings within the tolerance, ascending. Such a row has the pairs of the nearest
+    /// code, which may be none. Its error is the norm of its part outside the span of all atoms, or the error that rounding
+    /// of values leaves. If the coder has a cap on nonzeros, no rows are listed here; `errors` tells which rows are over
+    /// the tolerance.
     pub escapes: Vec<usize>,
 }
 
@@ -45,19 +48,19 @@ impl<V> Default for RowCodes<V> {
 }
 
 impl<V: RowValue> RowCodes<V> {
-    /// Number of rows.
+    /// Returns the number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
         self.errors.len()
     }
 
-    /// Whether there are no rows.
+    /// Returns whether there are no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.errors.is_empty()
     }
 
-    /// The (atom, value) pairs of row `i`, by ascending atom.
+    /// Returns the pairs (atom, value) of row `i`, by ascending atom.
     ///
     /// # Panics
     /// If `i` is not below [`Self::len`].
@@ -92,7 +95,7 @@ impl<V: RowValue> RowCodes<V> {
 #[derive(Debug)]
 pub(crate) struct Coded<'a, V> {
     pub(crate) row: &'a [V],
-    /// (atom, value) pairs by ascending atom.
+    /// Pairs (atom, value), by ascending atom.
     pub(crate) code: &'a [(u16, V)],
     /// The un-squared L2 norm of the error, in f64.
     pub(crate) error: f64,
@@ -100,7 +103,7 @@ pub(crate) struct Coded<'a, V> {
     is_escape: bool,
 }
 
-/// Codes rows of any size: with a coder where its f32 is enough, and in f64 where it is not.
+/// A coder of rows of any size. It uses a pursuit in f32 where f32 is enough, and a pursuit in f64 elsewhere.
 #[derive(Debug)]
 pub(crate) struct RowCoder<'a> {
     coder: &'a Coder,
@@ -112,7 +115,7 @@ impl<'a> RowCoder<'a> {
         Self { coder, careful: Careful::new(coder) }
     }
 
-    /// Codes `rows`, which are finite, one after the other on the calling thread, and passes each on.
+    /// Codes `rows` one after the other on the calling thread, and passes each code to `sink`. Rows must be finite.
     pub(crate) fn each<V: RowValue>(&self, rows: &[V], mut sink: impl FnMut(&Coded<'_, V>)) {
         let (mut work, mut own) = (Work::default(), Vec::new());
         let mut wide = rows.chunks_exact(self.coder.dim());
@@ -121,7 +124,7 @@ impl<'a> RowCoder<'a> {
             own.clear();
             own.extend(visit.code.iter().map(|&(atom, value)| (atom, V::nearest(value.into()))));
             let mut error = self.careful.error(row, &own, &mut work);
-            // Squares of a tiny row's error may be 0.
+            // The squares of a tiny row's error may underflow to 0, so `error` says nothing about a tiny row.
             let is_tiny = is_tiny(row, visit.signal);
             if is_tiny || !self.is_enough(&visit, error) {
                 let found = self.careful.code(row, visit.chosen, &mut work);
@@ -134,24 +137,24 @@ impl<'a> RowCoder<'a> {
         });
     }
 
-    /// Whether the code that `visit` has need not be searched for again. Its error in f64 is `error`.
+    /// Returns whether the code of `visit`, whose error in f64 is `error`, needs no search in f64.
     fn is_enough(&self, visit: &Visit<'_>, error: f64) -> bool {
         let is_capped = visit.outcome != Encoded::Escape && self.coder.tolerance().is_none();
         is_capped || error <= self.coder.promise()
     }
 }
 
-/// Whether `row`, which is `narrow` in f32, is not zero but too small for a pursuit in f32.
+/// Returns whether `row`, which is `narrow` in f32, is not zero but too small for a pursuit in f32.
 fn is_tiny<V: RowValue>(row: &[V], narrow: &[f32]) -> bool {
     let energy: f64 = narrow.iter().map(|&x| f64::from(x) * f64::from(x)).sum();
     energy < MIN_ENERGY && row.iter().any(|&x| x != V::default())
 }
 
-/// Codes `rows`, one after the other, each as long as an atom. `progress` is told of [`Stage::Code`].
+/// Codes `rows`, which lie one after the other and are each as long as an atom. `progress` is told of [`Stage::Code`].
 ///
-/// The codes are those of [`Coder::encode`] wherever these are within the tolerance. Other rows are coded anew in f64, and so
-/// are rows too large or too small for f32. A row stays over the tolerance only if no code is within it. The codes do not
-/// depend on the number of threads.
+/// The codes are those of [`Coder::encode`] where these are within the tolerance. Other rows, and rows too large or too
+/// small for f32, are coded anew in f64. A row stays over the tolerance only if no code is within it, or if the coder has a
+/// cap on nonzeros. The codes do not depend on the number of threads.
 ///
 /// # Errors
 /// [`Error::Parameter`](crate::Error::Parameter) if `rows` are not a whole number of finite rows, or if there are no

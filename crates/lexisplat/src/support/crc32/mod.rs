@@ -1,7 +1,7 @@
 //! CRC-32 of bytes.
 //!
-//! Where there is an instruction for it, crc32fast is fastest. In WebAssembly there is none, and its tables, which do not
-//! compress, would be a tenth of what a page loads.
+//! The crate crc32fast is fastest where the CPU has an instruction for CRC-32. WebAssembly has no such instruction. There,
+//! the tables of crc32fast, which do not compress, would be a tenth of the bytes that a page loads.
 
 #[cfg(any(test, target_family = "wasm"))]
 mod sliced;

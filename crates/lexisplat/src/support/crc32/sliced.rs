@@ -1,16 +1,17 @@
-//! CRC-32 of 16 bytes at a time, by tables that are made when the first ones are summed. It has what is used of crc32fast.
+//! CRC-32 of 16 bytes at a time, by tables that are made when the first bytes are summed. The module has the functions of
+//! crc32fast that are used.
 
 use std::sync::OnceLock;
 
 /// The polynomial of CRC-32 (IEEE 802.3) without its highest power, the lowest power in the highest bit.
 const POLYNOMIAL: u32 = 0xedb8_8320;
-/// Powers 0 and 8 of x in the same order.
+/// Powers 0 and 8 of x, in the same order of bits.
 const ONE: u32 = 1 << 31;
 const BYTE: u32 = 1 << 23;
-/// Bytes that are looked up together.
+/// Number of bytes that are looked up together.
 const SLICE: usize = 16;
 
-/// Of each value of a byte the remainder of it followed by 0 to 15 bytes of zeros.
+/// For each value of a byte, the remainder of the byte followed by 0 to 15 bytes of zeros.
 type Tables = [[u32; 256]; SLICE];
 
 static TABLES: OnceLock<Box<Tables>> = OnceLock::new();
@@ -30,12 +31,12 @@ fn tables() -> Box<Tables> {
     tables
 }
 
-/// The product with x.
+/// Returns the product of `a` and x.
 fn times_x(a: u32) -> u32 {
     a >> 1 ^ if a & 1 == 1 { POLYNOMIAL } else { 0 }
 }
 
-/// The product of two polynomials.
+/// Returns the product of the polynomials `a` and `b`.
 fn product(a: u32, mut b: u32) -> u32 {
     let mut sum = 0;
     for power in (0..u32::BITS).rev() {
@@ -47,14 +48,14 @@ fn product(a: u32, mut b: u32) -> u32 {
     sum
 }
 
-/// The CRC-32 of `bytes`.
+/// Returns the CRC-32 of `bytes`.
 pub(crate) fn hash(bytes: &[u8]) -> u32 {
     let mut hasher = Hasher::default();
     hasher.update(bytes);
     hasher.finalize()
 }
 
-/// Sums bytes that come piece by piece.
+/// The CRC-32 of bytes that come piece by piece.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Hasher {
     sum: u32,
@@ -66,12 +67,12 @@ impl Hasher {
         Self::default()
     }
 
-    /// Goes on after bytes whose sum is `sum`.
+    /// Continues after bytes whose CRC-32 is `sum`.
     pub(crate) fn new_with_initial(sum: u32) -> Self {
         Self { sum, bytes: 0 }
     }
 
-    /// The same, after this many bytes.
+    /// Continues after `bytes` bytes whose CRC-32 is `sum`.
     pub(crate) fn new_with_initial_len(sum: u32, bytes: u64) -> Self {
         Self { sum, bytes }
     }
@@ -97,7 +98,7 @@ impl Hasher {
         self.bytes = self.bytes.wrapping_add(bytes.len() as u64);
     }
 
-    /// Goes on after the bytes of `other`, as if they had come here.
+    /// Continues with the bytes of `other`, as if they had been added here.
     pub(crate) fn combine(&mut self, other: &Self) {
         let (mut shift, mut power, mut left) = (ONE, BYTE, other.bytes);
         while left > 0 {

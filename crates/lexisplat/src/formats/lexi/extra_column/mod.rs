@@ -11,9 +11,9 @@ use std::ops::Range;
 use crate::scene::extra::{ExtraValues, ScalarType, for_extra, with_scalar};
 use crate::support::parallel::{map_chunks, map_vec};
 
-/// Rows of a block but the last, which has what is left. [`LexiReader`](super::LexiReader) reads the rows of several chunks
-/// together, so each block is decoded once, or twice if such a group ends within it. Blocks half as long took 0.4 % more
-/// bytes on the columns measured.
+/// Number of rows of a block. The last block has the rows that are left. [`LexiReader`](super::LexiReader) reads the rows
+/// of several chunks together, so each block is decoded once, or twice if such a group of chunks ends within it. Blocks
+/// half as long took 0.4 % more bytes on the columns measured.
 pub(super) const BLOCK: usize = 1 << 16;
 /// The types of columns in the order of their numbers in files.
 const TYPES: [ScalarType; 8] = [
@@ -27,28 +27,28 @@ const TYPES: [ScalarType; 8] = [
     ScalarType::F64,
 ];
 
-/// Encodes a column whose values come part after part. How they are cut into parts does not change the bytes.
+/// An encoder of a column whose values come part after part. The bytes do not depend on how the values are cut into parts.
 #[derive(Debug)]
 pub(super) struct ColumnEncoder {
     ty: ScalarType,
     /// The bits of the values that do not fill a block yet.
     held: Vec<u64>,
-    /// Bytes that were not handed out yet.
+    /// Bytes that were not returned yet.
     out: Vec<u8>,
 }
 
 impl ColumnEncoder {
-    /// The encoder of a column of type `ty`.
+    /// Creates an encoder of a column of type `ty`.
     pub(super) fn new(ty: ScalarType) -> Self {
         let number = (0..).zip(TYPES).find(|t| t.1 == ty).map(|t| t.0);
         Self { ty, held: Vec::new(), out: number.into_iter().collect() }
     }
 
-    /// Takes the next values, which are of the column's type. Returns the bytes that follow those returned before.
+    /// Takes the next values, which must be of the column's type. Returns the bytes that follow the bytes returned before.
     pub(super) fn push(&mut self, values: &ExtraValues) -> Vec<u8> {
         debug_assert_eq!(values.scalar_type(), self.ty, "values of another type");
         let (len, width) = (values.len(), self.ty.bytes());
-        // Values that fill up the block that was begun.
+        // The number of values that go into the block that was begun.
         let first = if self.held.is_empty() { 0 } else { len.min(BLOCK - self.held.len()) };
         self.held.extend(bits(values, 0..first));
         if self.held.len() == BLOCK {
@@ -65,7 +65,7 @@ impl ColumnEncoder {
         std::mem::take(&mut self.out)
     }
 
-    /// The bytes that end the column.
+    /// Returns the bytes that end the column.
     pub(super) fn finish(mut self) -> Vec<u8> {
         if !self.held.is_empty() {
             block::put(&self.held, self.ty.bytes(), &mut self.out);
@@ -74,12 +74,12 @@ impl ColumnEncoder {
     }
 }
 
-/// The bits of values `range`, which are all there.
+/// Returns the bits of the values of `range`, which must all exist.
 fn bits(values: &ExtraValues, range: Range<usize>) -> Vec<u64> {
     for_extra!(values, v => v[range].iter().map(|value| numbers::from_bytes(&value.to_le_bytes())).collect())
 }
 
-/// What is wrong with the bytes of a column.
+/// Damage of the bytes of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum ColumnError {
     /// There is no byte for the type.
@@ -88,7 +88,7 @@ pub(super) enum ColumnError {
     /// No type has this number.
     #[error("type {0} is not known")]
     Type(u8),
-    /// The bytes end within a block, or where one should be.
+    /// The bytes end within a block, or where a block should be.
     #[error("block {0} is cut off")]
     Truncated(usize),
     /// Bytes follow the last block.
@@ -108,7 +108,7 @@ pub(super) struct Column<'a> {
 }
 
 impl<'a> Column<'a> {
-    /// The column of `rows` values in `bytes`. Nothing is allocated for blocks that are not there.
+    /// Finds the column of `rows` values in `bytes`. Nothing is allocated for blocks that are not there.
     pub(super) fn new(bytes: &'a [u8], rows: usize) -> Result<Self, ColumnError> {
         let (&number, mut rest) = bytes.split_first().ok_or(ColumnError::NoType)?;
         let ty = *TYPES.get(usize::from(number)).ok_or(ColumnError::Type(number))?;
@@ -122,15 +122,15 @@ impl<'a> Column<'a> {
         Ok(Self { ty, rows, blocks })
     }
 
-    /// Type of the values.
+    /// Returns the type of the values.
     #[cfg(test)]
     fn scalar_type(&self) -> ScalarType {
         self.ty
     }
 
-    /// The values of rows `range` as far as the column has them. Only blocks with such rows are decoded. A byte of a
-    /// block may stand for thousands of rows, so the caller has checked that there may be so many values. Each thread
-    /// needs memory for the words of one block besides.
+    /// Returns the values of rows `range`, as far as the column has them. Only blocks with such rows are decoded. A byte of
+    /// a block may stand for thousands of rows, so the caller must have checked that there may be so many values. Besides,
+    /// each thread needs memory for the words of one block.
     pub(super) fn values(&self, range: Range<usize>) -> Result<ExtraValues, ColumnError> {
         let end = range.end.min(self.rows);
         let start = range.start.min(end);
@@ -158,7 +158,7 @@ impl<'a> Column<'a> {
         })
     }
 
-    /// The bits of all values of block `k`.
+    /// Returns the bits of all values of block `k`.
     fn block(&self, k: usize) -> Result<Vec<u64>, ColumnError> {
         let rows = self.rows.saturating_sub(k * BLOCK).min(BLOCK);
         let bytes = self.blocks.get(k).ok_or(ColumnError::Truncated(k))?;

@@ -1,19 +1,19 @@
-//! Lists of whole numbers of 1, 2, 4 or 8 bytes in deflate streams, filtered so that these find something.
+//! Lists of whole numbers of 1, 2, 4 or 8 bytes in deflate streams, filtered so that deflate finds repetitions.
 
 use super::deflate;
 
-/// How a list of numbers lies in its streams.
+/// The way in which a list of numbers lies in its streams.
 ///
-/// Each took fewest bytes on some columns: plain bytes on places in palettes that repeat, planes on noise,
+/// Each filter took fewest bytes on some columns: plain bytes on places in palettes that repeat, planes on noise,
 /// differences on smooth values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 enum Filter {
-    /// One stream with the bytes of each number after those of the one before.
+    /// One stream, in which the bytes of each number follow the bytes of the number before.
     Plain = 1,
-    /// A stream of the lowest bytes of all numbers, then one of their second bytes, and so on.
+    /// A stream of the lowest bytes of all numbers, then a stream of their second bytes, and so on.
     Planes = 2,
-    /// Planes of the differences from the number before, by magnitude: 0, -1, 1, -2, ...
+    /// Planes of the differences from the number before. Differences are numbered by magnitude: 0, -1, 1, -2, ...
     Differences = 3,
 }
 
@@ -21,15 +21,16 @@ impl Filter {
     const ALL: [Self; 3] = [Self::Plain, Self::Planes, Self::Differences];
 }
 
-/// Appends the filter and the streams of `numbers`, each of `width` bytes, in the way that takes fewest bytes.
+/// Appends the filter and the streams of `numbers`, each of `width` bytes. The filter is the one with fewest bytes.
 pub(super) fn put(numbers: &[u64], width: usize, out: &mut Vec<u8>) {
-    // Plain bytes are the one plane of a byte. Wider numbers than those of a palette never took fewest bytes so.
+    // For numbers of one byte, plain bytes are the same as the one plane. For numbers of more than 2 bytes, which no place
+    // in a palette has, plain bytes never took fewest bytes.
     let tries = Filter::ALL.iter().filter(|&&filter| width == 2 || filter != Filter::Plain);
     let best = tries.map(|&filter| put_with(filter, numbers, width)).min_by_key(Vec::len);
     out.extend(best.unwrap_or_default());
 }
 
-/// Takes `count` numbers of `width` bytes that [`put`] appended from the front of `from`; `None` if it is anything else.
+/// Takes the `count` numbers of `width` bytes that [`put`] appended from the front of `from`; `None` for all other bytes.
 pub(super) fn take(from: &mut &[u8], count: usize, width: usize) -> Option<Vec<u64>> {
     let (&filter, rest) = from.split_first()?;
     *from = rest;
@@ -85,7 +86,7 @@ fn take_with(filter: Filter, from: &mut &[u8], count: usize, width: usize) -> Op
     Some(numbers)
 }
 
-/// The number in at most 8 little-endian bytes.
+/// Returns the number in at most 8 little-endian bytes.
 pub(super) fn from_bytes(bytes: &[u8]) -> u64 {
     bytes.iter().rev().fold(0, |number, &byte| (number << 8) | u64::from(byte))
 }
@@ -94,19 +95,19 @@ fn mask(width: usize) -> u64 {
     u64::MAX >> spare_bits(width)
 }
 
-/// Bits of a u64 that a number of `width` bytes does not need.
+/// Returns the number of bits of a u64 that a number of `width` bytes does not need.
 fn spare_bits(width: usize) -> usize {
     8 * (size_of::<u64>() - width)
 }
 
-/// The low `width` bytes of `difference`, a signed number, as an unsigned one by magnitude.
+/// Returns the low `width` bytes of `difference`, a signed number, as an unsigned number by magnitude.
 fn zigzag(difference: u64, width: usize) -> u64 {
     let spare = spare_bits(width);
     let signed = (difference << spare).cast_signed() >> spare;
     ((signed << 1) ^ (signed >> 63)).cast_unsigned()
 }
 
-/// Inverse of [`zigzag`] in its low bytes.
+/// Returns the inverse of [`zigzag`] in the low bytes of the result.
 fn unzigzag(number: u64) -> u64 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::support::rng::SplitMix64;
 
-/// Values of type `ty` with the low bits of `words`.
+/// Returns values of type `ty` with the low bits of `words`.
 fn values_of(ty: ScalarType, words: &[u64]) -> ExtraValues {
     with_scalar!(ty, T => {
         let value = |word: &u64| T::from_le_bytes(*word.to_le_bytes().first_chunk().unwrap());
@@ -13,7 +13,7 @@ fn values_of(ty: ScalarType, words: &[u64]) -> ExtraValues {
     })
 }
 
-/// 32 random bits.
+/// Returns 32 random bits.
 fn high_bits(random: &mut SplitMix64) -> u32 {
     u32::try_from(random.next() >> 32).unwrap()
 }
@@ -29,12 +29,12 @@ fn encode(values: &ExtraValues) -> Vec<u8> {
     bytes
 }
 
-/// All values of a column, found in `bytes`.
+/// Returns all values of the column in `bytes`.
 fn decode(bytes: &[u8], rows: usize) -> Result<ExtraValues, ColumnError> {
     Column::new(bytes, rows)?.values(0..rows)
 }
 
-/// Columns of `rows` rows that take different filters, smooth, noisy, constant and of few values.
+/// Returns columns of `rows` rows that take different filters: smooth, noisy, constant and of few values.
 fn columns(rows: usize) -> Vec<ExtraValues> {
     let mut random = SplitMix64::new(3);
     let walk = (0..rows).scan(100_u16, |value, _| {
@@ -63,7 +63,7 @@ proptest! {
             let wide = 8 * ty.bytes();
             let word = |word: u64| match kind {
                 0 => word,
-                // Few values, the NaNs of several payloads and signs among them.
+                // Few values, among them NaNs of several payloads and signs.
                 1 => (u64::MAX << (wide / 2)) ^ (word % 5),
                 // Zeros of either sign.
                 2 => (word & 1) << (wide - 1),
@@ -125,7 +125,7 @@ fn parts_do_not_change_the_bytes_and_ranges_are_slices() {
 fn only_the_blocks_of_a_range_are_decoded() {
     let rows = 2 * BLOCK + 10;
     let mut bytes = encode(&columns(rows)[4]);
-    // The filter of the last block, before a value of 8 bytes.
+    // The filter of the last block comes before a value of 8 bytes.
     let filter = bytes.len() - 9;
     bytes[filter] = 99;
     let column = Column::new(&bytes, rows).unwrap();
@@ -163,7 +163,7 @@ fn damage_is_refused_or_gives_as_many_values() {
     }
 }
 
-/// A column of type U8 with one block, whose body is `body`.
+/// Returns a column of type U8 with one block, whose body is `body`.
 fn column_of(body: &[u8]) -> Vec<u8> {
     let number = TYPES.iter().position(|&ty| ty == ScalarType::U8).unwrap();
     [&[number.to_le_bytes()[0]], &deflate::length_bytes(body.len())[..], body].concat()
@@ -181,7 +181,7 @@ fn blocks_that_no_encoder_makes_are_refused() {
     };
     assert_eq!(decode(&palette(1, &[7, 9], &[0, 1, 1]), 3).unwrap(), vec![7_u8, 9, 9].into());
     let damaged = Err(ColumnError::Block(0));
-    // A place beyond the palette, a palette longer than the block, one of another length.
+    // A place beyond the palette, a palette longer than the block, and a palette of another length than stated.
     assert_eq!(decode(&palette(1, &[7, 9], &[0, 1, 2]), 3), damaged);
     assert_eq!(decode(&palette(3, &[7, 9, 1, 2], &[0, 1, 1]), 3), damaged);
     assert_eq!(decode(&palette(1, &[7, 9, 1], &[0, 1, 1]), 3), damaged);

@@ -5,17 +5,20 @@ use crate::sparse::atoms::check_dim;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 
-/// What the bytes begin with, followed by the version.
+/// First bytes of the layout. The version follows them.
 const MAGIC: [u8; 4] = *b"LXST";
 /// Version of the layout.
 const VERSION: u32 = 1;
-/// Bytes of the magic, the version, the two sizes and the three scalars.
+/// Number of bytes of the magic, the version, the two sizes and the three scalars.
 const HEAD: usize = 4 + 3 * 4 + 3 * 8;
 
 impl Statistics {
-    /// The statistics as bytes. All numbers are little-endian: `LXST`; as u32 the version (1), the length of an atom
-    /// and the number of atoms; as f64 the rows, the nonzeros and the squared error; then the lower triangle of the sum
-    /// of `g g^T`, row by row, and the sum of `g x^T`, atom by atom.
+    /// Returns the statistics as bytes. All numbers are little-endian. The parts are, in this order:
+    ///
+    /// - `LXST`;
+    /// - as u32, the version (1), the length of an atom and the number of atoms;
+    /// - as f64, the number of rows, the nonzeros and the squared error;
+    /// - as f64, the lower triangle of the sum of `g g^T`, row by row, and the sum of `g x^T`, atom by atom.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = Vec::with_capacity(HEAD + size_of::<f64>() * (self.pairs.len() + self.products.len()));
@@ -31,11 +34,11 @@ impl Statistics {
         out
     }
 
-    /// Statistics from [`Self::to_bytes`]. Sizes are checked before anything is allocated.
+    /// Reads statistics from the bytes of [`Self::to_bytes`]. Sizes are checked before anything is allocated.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for other bytes, a newer version, sizes out of range, a length that does not fit them, and
-    /// for numbers that no rows have: NaN, infinities, and negative counts, errors or energies.
+    /// [`Error::Parameter`] if the bytes have another layout or version, if a size is out of range, or if the length does
+    /// not fit the sizes. Also for numbers that no rows have: NaN, infinities, and negative counts, errors or energies.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let refused = |value: String, expected: &str| Err(Error::parameter("statistics", value, expected));
         let Some((head, rest)) = bytes.split_at_checked(HEAD) else {

@@ -13,24 +13,27 @@ use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::{Progress, Stage};
 
-/// Rows whose sums are added up by themselves, from 0, before they are added to those of the rows before them.
+/// Number of rows in a block. The sums of a block are added up from 0, and then added to the sums of the blocks before it.
 pub const ROWS_PER_BLOCK: usize = 256;
-/// Most bytes of blocks that wait to be added, and most blocks. The result depends on neither.
+/// Largest number of bytes of blocks that wait to be added, and largest number of such blocks. The result depends on
+/// neither.
 const WAITING_BYTES: usize = 64 << 20;
 const WAITING_BLOCKS: usize = 256;
-/// A new direction shorter than this share of an atom's energy is rounding noise, and the atom stays as it is.
+/// Smallest norm of a new direction of an atom, as a share of the atom's energy. A shorter direction is rounding noise, and
+/// the atom stays as it is.
 const NOISE: f64 = 1e-9;
 
-/// What online dictionary learning needs to know of coded rows: with codes `g` of rows `x`, the sums of `g g^T` and of
-/// `g x^T`, and the number of rows, their nonzeros and squared errors.
+/// The sums over coded rows that online dictionary learning needs. With codes `g` of rows `x`, they are the sums of `g g^T`
+/// and of `g x^T`, the number of rows, their nonzeros and their squared errors.
 ///
-/// All sums are f64. **The order of additions is fixed.** [`Statistics::of`] cuts rows into blocks of
-/// [`ROWS_PER_BLOCK`], sums each block by itself in the order of its rows, and adds the sums of the blocks in order to
-/// sums of 0. The bits of the result therefore do not depend on threads or CPU. Statistics of single blocks, made
-/// anywhere and added one at a time in the order of the blocks ([`Statistics::add`]), have the same bits as those of
-/// all rows at once. Sums of several blocks that are then added to others, such as those of two halves, are grouped
-/// differently and may differ in the last bits. Their result depends only on how rows are cut into such groups and on
-/// the order of the groups, not on who sums them.
+/// All sums are f64. **The order of additions is fixed.** [`Statistics::of`] cuts rows into blocks of [`ROWS_PER_BLOCK`],
+/// sums each block by itself in the order of its rows, and adds the sums of the blocks in order to sums of 0. The bits of
+/// the result therefore do not depend on threads or CPU.
+///
+/// Statistics of single blocks can be made anywhere. If they are added one at a time in the order of the blocks
+/// ([`Statistics::add`]), the result has the same bits as the statistics of all rows at once. Sums of several blocks that
+/// are then added to other sums, such as the sums of two halves, are grouped differently and may differ in the last bits.
+/// Their result depends only on how rows are cut into such groups and on the order of the groups, not on who sums them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Statistics {
     dim: usize,
@@ -45,7 +48,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Sums of 0, for codes over as many atoms as `atoms` and of the same length.
+    /// Returns sums of 0, for codes over atoms of the number and length of `atoms`.
     #[must_use]
     pub fn zero(atoms: &Atoms) -> Self {
         Self::zeros(atoms.dim(), atoms.len())
@@ -63,12 +66,13 @@ impl Statistics {
         }
     }
 
-    /// Codes `rows` with `coder`, one after the other, and sums their statistics. A row that no code brings within the
-    /// tolerance counts with the code that comes nearest, as [`encode_rows`](crate::pursuit::encode_rows) has them.
+    /// Codes `rows`, which lie one after the other, with `coder` and sums their statistics. A row that no code brings
+    /// within the tolerance counts with the code that comes nearest, as in [`encode_rows`](crate::pursuit::encode_rows).
     /// `progress` is told of [`Stage::Code`].
     ///
-    /// Atoms learn from what codes leave. Codes to a small tolerance leave little, and atoms that are far from good ones
-    /// then move slowly. A cap on nonzeros in the coder's [`StopRule`](crate::pursuit::StopRule) leaves more.
+    /// Atoms learn from the residuals of codes. Codes to a small tolerance leave small residuals, and atoms that are far
+    /// from good atoms then move slowly. A cap on nonzeros in the coder's [`StopRule`](crate::pursuit::StopRule) leaves
+    /// larger residuals.
     ///
     /// # Errors
     /// [`Error::Parameter`] if `rows` are not a whole number of finite rows, or if there are no atoms (SH degree 0).
@@ -94,7 +98,7 @@ impl Statistics {
         Ok(sum)
     }
 
-    /// The statistics of the rows of `range`, summed in order on the calling thread.
+    /// Returns the statistics of the rows of `range`, summed in order on the calling thread.
     fn of_block<V: RowValue>(
         coder: &RowCoder<'_>,
         [dim, atoms]: [usize; 2],
@@ -113,7 +117,7 @@ impl Statistics {
             for (i, &(atom, value)) in coded.code.iter().enumerate() {
                 let (j, value) = (usize::from(atom), value.wide());
                 let pairs = &mut sum.pairs[triangle(j)..triangle(j + 1)];
-                // Atoms ascend, so none of these is above `atom`.
+                // Atoms ascend within a code, so `other` is never above `atom`.
                 for &(other, other_value) in &coded.code[..=i] {
                     pairs[usize::from(other)] += value * other_value.wide();
                 }
@@ -127,10 +131,10 @@ impl Statistics {
         Ok(sum)
     }
 
-    /// Adds `other`, element by element.
+    /// Adds the sums of `other`, element by element.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `other` is of another number or length of atoms.
+    /// [`Error::Parameter`] if the atoms of `other` differ in number or length.
     pub fn add(&mut self, other: &Self) -> Result<()> {
         self.check_size("statistics", other.atoms, other.dim)?;
         self.add_sums(other);
@@ -145,7 +149,7 @@ impl Statistics {
         self.products.iter_mut().zip(&other.products).for_each(|(a, b)| *a += b);
     }
 
-    /// All sums times `factor`, by which older rows are forgotten.
+    /// Multiplies all sums by `factor`, so that older rows are forgotten.
     ///
     /// # Errors
     /// [`Error::Parameter`] if `factor` is not from 0 to 1.
@@ -160,15 +164,15 @@ impl Statistics {
         Ok(self)
     }
 
-    /// Returns better atoms: one pass of block coordinate descent, which refits each of `atoms` in turn to the sums,
-    /// with the codes as they are, and scales it to unit norm. Later atoms see the new ones. An atom that no code uses
-    /// stays as it is. More passes bring the atoms nearer to the best for these codes.
+    /// Returns better atoms, by one pass of block coordinate descent. The pass refits each of `atoms` in turn to the sums,
+    /// with the codes as they are, and scales the atom to unit norm. Later atoms see the new values of earlier atoms. An
+    /// atom that no code uses stays as it is. More passes bring the atoms nearer to the best atoms for these codes.
     ///
-    /// The sums need not be those of codes over `atoms`. Codes of earlier batches over earlier atoms are what Mairal's
-    /// method remembers.
+    /// The sums need not come from codes over `atoms`. In Mairal's method, they come from codes of earlier batches over
+    /// earlier atoms.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `atoms` are of another number or length.
+    /// [`Error::Parameter`] if `atoms` differ in number or length from the atoms of the statistics.
     pub fn update(&self, atoms: &Atoms) -> Result<Atoms> {
         self.check_size("atoms", atoms.len(), atoms.dim())?;
         let dim = self.dim;
@@ -178,7 +182,8 @@ impl Statistics {
             if energy.is_nan() || energy <= 0.0 {
                 continue;
             }
-            // The sum of g_j (x - sum_k g_k d_k) over all other atoms k, which is `energy` times the best atom.
+            // The target is the sum over rows of `g_j (x - sum_k g_k d_k)`, with k over all other atoms. It is `energy`
+            // times the best atom.
             let mut target = self.products[j * dim..(j + 1) * dim].to_vec();
             for (k, other) in values.chunks_exact(dim).enumerate() {
                 let pair = self.pair(j, k);
@@ -201,12 +206,12 @@ impl Statistics {
         Err(Error::parameter(name, format!("{atoms} atoms of {dim} values"), expected))
     }
 
-    /// The sum of the products of the values of atoms `j` and `k`.
+    /// Returns the sum over codes of the product of the values of atoms `j` and `k`.
     fn pair(&self, j: usize, k: usize) -> f64 {
         self.pairs[triangle(j.max(k)) + j.min(k)]
     }
 
-    /// The sum of the squared values of atom `j`; 0 if no code uses it.
+    /// Returns the sum over codes of the squared value of atom `j`; 0 if no code uses the atom.
     ///
     /// # Panics
     /// If `j` is not below [`Self::atoms`].
@@ -215,38 +220,38 @@ impl Statistics {
         self.pair(j, j)
     }
 
-    /// Values of a row.
+    /// Returns the number of values of a row.
     #[must_use]
     pub fn dim(&self) -> usize {
         self.dim
     }
 
-    /// Number of atoms.
+    /// Returns the number of atoms.
     #[must_use]
     pub fn atoms(&self) -> usize {
         self.atoms
     }
 
-    /// Number of rows. It is whole unless [`Self::scaled`] changed it.
+    /// Returns the number of rows. It is whole unless [`Self::scaled`] changed it.
     #[must_use]
     pub fn rows(&self) -> f64 {
         self.rows
     }
 
-    /// Nonzeros of all codes.
+    /// Returns the number of nonzeros of all codes.
     #[must_use]
     pub fn nonzeros(&self) -> f64 {
         self.nonzeros
     }
 
-    /// Sum of the squared L2 norms of the errors of all rows.
+    /// Returns the sum of the squared L2 norms of the errors of all rows.
     #[must_use]
     pub fn squared_error(&self) -> f64 {
         self.squared_error
     }
 }
 
-/// Entries of the first `rows` rows of a lower triangle.
+/// Returns the number of entries in the first `rows` rows of a lower triangle.
 fn triangle(rows: usize) -> usize {
     rows * (rows + 1) / 2
 }

@@ -1,4 +1,4 @@
-//! Statistics against naive sums, in any grouping that is promised, and what atoms become of them.
+//! Tests of statistics against naive sums, of the groupings that keep all bits, and of the atoms that updates return.
 
 use super::super::learn_atoms;
 use super::super::tests::{cost, random_atoms, sparse_rows, tolerance};
@@ -19,7 +19,7 @@ fn coder(atoms: &Atoms, tol: f64) -> Coder {
     Coder::over(atoms, Pursuit::Ols, tolerance(tol), ValueType::F32)
 }
 
-/// Atoms, and rows of others.
+/// Returns random atoms, and rows that are sums of other atoms.
 fn example(rows: usize) -> (Atoms, Vec<f32>) {
     let mut rng = SplitMix64::new(41);
     let atoms = random_atoms(DIM, ATOMS, &mut rng);
@@ -27,7 +27,7 @@ fn example(rows: usize) -> (Atoms, Vec<f32>) {
     (atoms, rows)
 }
 
-/// At most 3 nonzeros, as many as rows are made of.
+/// Returns a rule of at most 3 nonzeros, which is as many as the atoms that each row is made of.
 fn few() -> StopRule {
     StopRule::new(None, Some(3)).unwrap()
 }
@@ -40,7 +40,7 @@ fn statistics(atoms: &Atoms, rows: &[f32]) -> Statistics {
     Statistics::of(&coder(atoms, TOLERANCE), rows, &Silent).unwrap()
 }
 
-/// The codes as full vectors.
+/// Returns the codes as full vectors.
 fn dense(codes: &RowCodes, atoms: usize) -> Vec<Vec<f64>> {
     let full = |i: usize| {
         let mut out = vec![0.0; atoms];
@@ -50,14 +50,14 @@ fn dense(codes: &RowCodes, atoms: usize) -> Vec<Vec<f64>> {
     (0..codes.len()).map(full).collect()
 }
 
-/// All bits.
+/// Returns all bits of `statistics`.
 fn bits(statistics: &Statistics) -> Vec<u8> {
     statistics.to_bytes()
 }
 
 #[test]
 fn sums_are_those_of_full_matrices() {
-    // Few atoms for long rows as well, so that rows are out of reach.
+    // The second case has few atoms for long rows, so that rows are out of reach.
     for (dim, count) in [(DIM, ATOMS), (9, 4), (1, 1)] {
         let mut rng = SplitMix64::new(42);
         let atoms = random_atoms(dim, count, &mut rng);
@@ -86,7 +86,7 @@ fn sums_are_those_of_full_matrices() {
 
 #[test]
 fn threads_and_the_place_of_blocks_do_not_change_bits() {
-    // More blocks than wait at once.
+    // There are more blocks than may wait at once.
     let (atoms, rows) = example(300 * ROWS_PER_BLOCK + 50);
     let whole = statistics(&atoms, &rows);
     for threads in [1, 2, 7] {
@@ -99,14 +99,14 @@ fn threads_and_the_place_of_blocks_do_not_change_bits() {
         sum.add(&Statistics::from_bytes(&sent).unwrap()).unwrap();
     }
     assert!(bits(&sum) == bits(&whole));
-    // The first half may also be summed as a whole, since that is where the sum begins.
+    // The first half may also be summed as a whole, since the sum of all rows begins with it.
     let (first, second) = rows.split_at(150 * ROWS_PER_BLOCK * DIM);
     let mut sum = statistics(&atoms, first);
     for block in second.chunks(ROWS_PER_BLOCK * DIM) {
         sum.add(&statistics(&atoms, block)).unwrap();
     }
     assert!(bits(&sum) == bits(&whole));
-    // Two halves are another grouping: the same sums but for rounding.
+    // The sums of two halves are grouped differently. They are the same sums but for rounding.
     let mut halves = statistics(&atoms, first);
     halves.add(&statistics(&atoms, second)).unwrap();
     assert_eq!((halves.rows(), halves.nonzeros()), (whole.rows(), whole.nonzeros()));
@@ -130,7 +130,7 @@ fn older_rows_are_forgotten() {
     }
 }
 
-/// The squared error of `rows` as sums of `atoms` with the values of `codes`.
+/// Returns the squared error of `rows` as sums of `atoms` with the values of `codes`.
 fn misfit(atoms: &Atoms, codes: &RowCodes, rows: &[f32]) -> f64 {
     let mut sum = 0.0;
     for (i, row) in rows.chunks_exact(atoms.dim()).enumerate() {
@@ -159,7 +159,7 @@ fn an_update_fits_the_atoms_to_the_codes() {
         last = error;
     }
     assert!(last < 0.98 * first, "{last} {first}");
-    // The first atom of one pass is the best unit vector for what the others leave of its rows.
+    // The first atom after one pass is the best unit vector for the residuals that the other atoms leave of its rows.
     let full = dense(&codes, ATOMS);
     let mut target = vec![0.0; DIM];
     for (g, row) in full.iter().zip(rows.chunks_exact(DIM)) {
@@ -186,7 +186,7 @@ fn unused_atoms_stay_as_they_are() {
     for j in (0..ATOMS).filter(|&j| j != 4) {
         assert_eq!(new.atom(j), atoms.atom(j), "atom {j}");
     }
-    // Without rows, and with rows of zeros, nothing moves.
+    // Without rows, and with rows of zeros, no atom moves.
     assert_eq!(Statistics::zero(&atoms).update(&atoms).unwrap(), atoms);
     let zeros = statistics(&atoms, &[0.0; 10 * DIM]);
     assert_eq!((zeros.rows(), zeros.nonzeros()), (10.0, 0.0));
@@ -199,8 +199,8 @@ fn unused_atoms_stay_as_they_are() {
     }
 }
 
-/// Rounds of coding and updating, from random atoms, come near what learning from all rows at once finds. Codes with
-/// few nonzeros leave residuals that move the atoms far.
+/// Rounds of coding and updating, from random atoms, come near the error of atoms that are learned from all rows at once.
+/// Codes with few nonzeros leave residuals that move the atoms far.
 #[test]
 fn rounds_learn_a_dictionary() {
     let mut rng = SplitMix64::new(44);
@@ -220,7 +220,7 @@ fn rounds_learn_a_dictionary() {
     assert!(nonzeros < 0.7 * first[1][0], "{nonzeros} {first:?}");
 }
 
-/// Mairal's method: batches pass once or a few times, and older sums fade.
+/// Mairal's method: batches pass several times, and older sums fade.
 #[test]
 fn batches_learn_a_dictionary() {
     let mut rng = SplitMix64::new(45);

@@ -1,4 +1,4 @@
-//! Rows that f32 is not enough for, against least squares in f64.
+//! Tests of rows for which f32 is not enough, against least squares in f64.
 
 use super::oracle::{basis_of, dot, off, random_atoms, wide};
 use crate::sparse::atoms::Atoms;
@@ -8,10 +8,10 @@ use crate::support::progress::Silent;
 use crate::support::rng::SplitMix64;
 use proptest::prelude::*;
 
-/// Atoms whose distance to the span of others is below this add nothing that the oracle counts on.
+/// Largest distance of an atom to the span of other atoms at which [`span`] leaves the atom out.
 const IN_SPAN: f64 = 1e-7;
 
-/// Normally distributed numbers, about: sums of twelve uniform ones.
+/// Returns a number that is about normally distributed: the sum of twelve uniform numbers, less its mean.
 fn normal(rng: &mut SplitMix64) -> f64 {
     (0..12).map(|_| (rng.next() >> 11) as f64 / (1_u64 << 53) as f64).sum::<f64>() - 6.0
 }
@@ -24,7 +24,7 @@ fn coder(atoms: &Atoms, pursuit: Pursuit, tolerance: f64) -> Coder {
     Coder::over(atoms, pursuit, StopRule::new(Some(tolerance), None).unwrap(), ValueType::F32)
 }
 
-/// The directions of the span of all atoms.
+/// Returns an orthonormal basis of the span of all atoms.
 fn span(atoms: &Atoms) -> Vec<Vec<f64>> {
     let all: Vec<Vec<f64>> = (0..atoms.len()).map(|j| wide(atoms.atom(j))).collect();
     let mut chosen: Vec<usize> = Vec::new();
@@ -37,7 +37,8 @@ fn span(atoms: &Atoms) -> Vec<Vec<f64>> {
     basis_of(&all, chosen)
 }
 
-/// Checks errors and escapes of codes of `rows`. `epsilon` is half the distance of neighbours of 1 in the type of values.
+/// Checks the errors and escapes of `codes`. `epsilon` is half the distance from 1 to the next number in the type of the
+/// values.
 fn check<V: RowValue>(
     atoms: &Atoms,
     rows: &[V],
@@ -118,7 +119,7 @@ fn rows_that_the_fast_pursuit_leaves_over_are_within() {
         let coder = coder(&atoms, Pursuit::Ols, tolerance);
         let mut over = 0;
         coder.encode(&narrow, |visit| over += usize::from(visit.outcome == Encoded::Escape));
-        // Of tiny rows it takes other atoms than those that help most.
+        // For tiny rows, the fast pursuit takes other atoms than those that help most, but it may reach the tolerance.
         assert!(over > 0 || scale < 1.0, "the fast pursuit is enough at {tolerance}");
         let codes = encode_rows(&coder, &wide, &Silent).unwrap();
         assert!(codes.escapes.is_empty() && codes.errors.iter().all(|&e| e <= tolerance), "{tolerance}");
@@ -147,7 +148,7 @@ fn rows_of_any_size_have_the_same_codes_and_the_cap_is_kept() {
     }
 }
 
-/// Two atoms that differ in their last bits alone: values along their difference are large, and f32 cannot hold them.
+/// Two atoms differ in their last bits alone. Values along their difference are large, and f32 cannot hold them.
 #[test]
 fn values_of_half_precision_are_rounded_and_rows_still_coded() {
     let (a, b) = (0.6_f32, 0.8_f32);

@@ -1,4 +1,4 @@
-//! The pursuit of rows of any length over any number of atoms.
+//! Tests of the pursuit of rows of any length over any number of atoms.
 
 use super::oracle::{basis_of, check_agreement, dot, off, random_atoms, random_rows, wide};
 use crate::sparse::atoms::{Atoms, MAX_DIM};
@@ -14,7 +14,7 @@ fn tolerance(tolerance: f64) -> StopRule {
     StopRule::new(Some(tolerance), None).unwrap()
 }
 
-/// The code of one row as it is visited, and its error; `None` for an escape.
+/// Returns the code of `row` as it is visited, and its error. The error is `None` for an escape.
 fn coded(coder: &Coder, row: &[f32]) -> (Vec<(u16, f32)>, Option<f64>) {
     let mut out = Vec::new();
     coder.encode(row, |visit| {
@@ -47,7 +47,7 @@ proptest! {
         }
     }
 
-    /// The error reported is that of the row that the atoms make of the code, also of rows out of reach.
+    /// The reported error is the error of the row that the atoms reconstruct from the code, also for rows out of reach.
     #[test]
     fn reported_error_is_that_of_the_reconstruction(
         seed in any::<u64>(),
@@ -88,7 +88,7 @@ fn engine_agrees_with_the_oracle_on_long_rows() {
     }
 }
 
-/// The rows of numbers that a row of axes needs all of.
+/// A row without zeros needs all axes if the atoms are the axes.
 #[test]
 fn codes_of_more_than_255_nonzeros_are_whole() {
     for dim in [255, 256, 300, MAX_DIM] {
@@ -107,7 +107,7 @@ fn codes_of_more_than_255_nonzeros_are_whole() {
     }
 }
 
-/// What an escape ends with is the projection on all atoms.
+/// The code that an escape ends with is the projection of the row on all atoms.
 #[test]
 fn rows_out_of_reach_keep_the_nearest_code() {
     let mut rng = SplitMix64::new(9);

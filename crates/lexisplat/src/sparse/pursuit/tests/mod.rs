@@ -1,4 +1,4 @@
-//! Tests of the pursuit against a naive one in f64.
+//! Tests of the pursuit against a naive pursuit in f64.
 
 mod careful;
 mod lengths;
@@ -43,7 +43,7 @@ proptest! {
         }
     }
 
-    /// Coding to a tolerance keeps it, with no atom that the last step did not need.
+    /// Every code is within the tolerance, and would not be without the atom of the last step.
     #[test]
     fn codes_end_at_the_tolerance(seed in any::<u64>(), degree in 1_u8..=4, tol in 0.05_f64..0.8) {
         let degree = ShDegree::new(degree).unwrap();
@@ -58,7 +58,8 @@ proptest! {
             coder.encode(&signals, |visit| {
                 let Encoded::Code { error } = visit.outcome else { panic!("escape") };
                 assert!(error <= tol, "{error} {tol}");
-                // Whichever atom came last, some one less does not reach it.
+                // A code does not tell which atom came last. Without that atom, the error is above the tolerance, so the
+                // largest error without one of the atoms is too.
                 let without = |skip: usize| {
                     let kept = visit.code.iter().enumerate().filter(move |p| p.0 != skip);
                     let basis = basis_of(&all, kept.map(|(_, p)| usize::from(p.0)));
@@ -73,7 +74,7 @@ proptest! {
         }
     }
 
-    /// The error reported is that of the very values a decoder reconstructs.
+    /// The reported error is the error of the very values that a decoder reconstructs.
     #[test]
     fn reported_error_is_the_decoders(seed in any::<u64>(), f16 in any::<bool>(), scale in 0.01_f32..3.0) {
         let degree = ShDegree::THREE;

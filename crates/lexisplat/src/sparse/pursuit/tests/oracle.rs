@@ -5,14 +5,15 @@ use crate::sparse::model::Pursuit;
 use crate::sparse::pursuit::greedy::{ANY, Plan};
 use crate::support::rng::SplitMix64;
 
-/// A candidate whose squared distance to the chosen span is below this may be refused by the engine.
+/// Squared distance to the chosen span below which the engine may refuse a candidate.
 pub(super) const NEAR_SPAN: f64 = 1e-4;
 
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// The part of `vector` outside the span of an orthonormal `basis`. It is projected twice because of rounding.
+/// Returns the part of `vector` outside the span of an orthonormal `basis`. The vector is projected twice because of
+/// rounding.
 pub(super) fn off(basis: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
     let mut left = vector.to_vec();
     for _ in 0..2 {
@@ -32,7 +33,7 @@ pub(super) fn normalised(mut vector: Vec<f64>) -> Vec<f64> {
     vector
 }
 
-/// An orthonormal basis of the span of chosen atoms.
+/// Returns an orthonormal basis of the span of the chosen atoms.
 pub(super) fn basis_of(atoms: &[Vec<f64>], chosen: impl IntoIterator<Item = usize>) -> Vec<Vec<f64>> {
     let mut basis = Vec::new();
     for j in chosen {
@@ -41,8 +42,8 @@ pub(super) fn basis_of(atoms: &[Vec<f64>], chosen: impl IntoIterator<Item = usiz
     basis
 }
 
-/// The score by which a pursuit whose chosen atoms span `basis` prefers each atom; `None` for atoms too close to the
-/// span.
+/// Returns the score of each atom, by which a pursuit whose chosen atoms span `basis` prefers it. The score is `None` for
+/// atoms too close to the span.
 pub(super) fn scores(
     pursuit: Pursuit,
     atoms: &[Vec<f64>],
@@ -63,11 +64,11 @@ pub(super) fn scores(
         .collect()
 }
 
-/// Two atoms whose scores differ by at most this share of the best score are equally good in f32.
+/// Share of the best score. Two atoms whose scores differ by at most this share are equally good in f32.
 pub(super) const CLOSE: f64 = 1e-3;
 /// Squared rounding noise of f32 recurrences over at most 72 steps, as a share of the signal's energy.
 pub(super) const NOISE: f64 = 1e-9;
-/// Largest error of f32 recurrences, as a share of the signal. The tolerance is checked in f64, not by them.
+/// Largest error of f32 recurrences, as a share of the signal. The tolerance is checked in f64, not by these recurrences.
 pub(super) const ROUNDING: f64 = 1e-3;
 
 #[expect(clippy::cast_possible_truncation, reason = "test data are small")]
@@ -93,8 +94,9 @@ pub(super) fn wide(values: &[f32]) -> Vec<f64> {
     values.iter().map(|&x| f64::from(x)).collect()
 }
 
-/// Checks that at every step the engine takes the atom the oracle would take after the same choices, or one so close to
-/// it that f32 cannot tell; and that its least-squares solution is as good as the oracle's.
+/// Checks the engine against the oracle. At every step, the engine must take the atom that the oracle would take after the
+/// same choices, or an atom so close to it that f32 cannot tell. The engine's least-squares solution must be as good as the
+/// oracle's.
 pub(super) fn check_agreement(atoms: &Atoms, signal: &[f32], pursuit: Pursuit, tol: f64) {
     let all: Vec<Vec<f64>> = (0..atoms.len()).map(|j| wide(atoms.atom(j))).collect();
     let plan = Plan::new(atoms);
@@ -112,7 +114,7 @@ pub(super) fn check_agreement(atoms: &Atoms, signal: &[f32], pursuit: Pursuit, t
             break;
         }
         let (&taken, before) = scratch.chosen[..scratch.len].split_last().unwrap();
-        // Noise about an atom in the span may be all that is left to choose.
+        // Noise about an atom in the span may be all that is left, and the engine may then choose that atom again.
         let again = before.contains(&taken);
         let taken = usize::from(taken);
         if let Some(score) = scores[taken].filter(|_| !again) {

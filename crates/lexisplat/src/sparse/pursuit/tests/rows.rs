@@ -1,4 +1,4 @@
-//! Many rows at once give what one row at a time gives, if that is within the tolerance.
+//! Tests that many rows at once have the same codes as one row at a time, if these codes are within the tolerance.
 
 use super::oracle::{random_atoms, random_rows};
 use crate::sparse::model::Pursuit;
@@ -13,7 +13,7 @@ fn coder(dim: usize, atoms: usize, tolerance: f64, rng: &mut SplitMix64) -> Code
     Coder::over(&random_atoms(dim, atoms, rng), Pursuit::Ols, stop, ValueType::F32)
 }
 
-/// The codes of [`Coder::encode`], and whether each is within the tolerance.
+/// Returns the codes of [`Coder::encode`], and whether each code is within the tolerance.
 fn one_by_one(coder: &Coder, rows: &[f32]) -> Vec<(Vec<(usize, f32)>, bool)> {
     let mut out = Vec::new();
     coder.encode(rows, |visit| {
@@ -30,7 +30,7 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 #[test]
 fn all_rows_are_coded_in_order_on_any_number_of_threads() {
     let mut rng = SplitMix64::new(21);
-    // The first has rows in several batches; of the second some rows are out of reach, and some are not.
+    // The first case has rows in several batches. In the second case, some rows are out of reach, and some are not.
     for (dim, atoms, count, tolerance) in [(2, 3, 66_000, 0.3), (20, 15, 1500, 1.2), (300, 4, 5, 0.1)] {
         let coder = coder(dim, atoms, tolerance, &mut rng);
         let rows = random_rows(dim, count, 1.0, &mut rng);
@@ -42,7 +42,7 @@ fn all_rows_are_coded_in_order_on_any_number_of_threads() {
         assert_eq!(found.len(), count);
         assert!(dim != 20 || (1..count).contains(&found.escapes.len()), "{}", found.escapes.len());
         for (i, (code, is_within)) in one_by_one(&coder, &rows).into_iter().enumerate() {
-            // Errors in f64 and in f32 may be on two sides of the tolerance.
+            // An error in f32 and the error in f64 may lie on two sides of the tolerance.
             if is_within && found.errors[i] < tolerance * (1.0 - 1e-6) {
                 assert!(found.row(i).eq(code), "row {i}");
             }
@@ -66,7 +66,7 @@ fn odd_rows_are_refused_or_coded() {
     assert!(error.contains("row 700"), "{error}");
 }
 
-/// Cancels after some rows.
+/// A progress that cancels after some rows.
 #[derive(Default)]
 struct Impatient {
     begun: AtomicU64,
