@@ -1,11 +1,5 @@
 //! Decoding of a chunk to the values that are drawn.
 
-#![expect(clippy::cast_possible_truncation, reason = "values are within limits that are checked or clamped")]
-#![expect(
-    clippy::needless_range_loop,
-    reason = "loops over lanes are written out, since iterators over several arrays do not become vector code"
-)]
-
 use std::ops::Range;
 
 use half::f16;
