@@ -1,6 +1,7 @@
 //! The `lexisplat` command: compress, decompress, draw and compare 3D Gaussian Splatting scenes.
 
 mod args;
+mod bar;
 mod commands;
 mod device;
 mod exit;
@@ -20,7 +21,7 @@ fn main() -> ExitCode {
     let json = cli.common.json;
     stop::listen();
     let done = commands::run(cli);
-    progress::clear();
+    bar::clear();
     stop::wait_if_stopped();
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -2,13 +2,14 @@
 //! ten seconds.
 
 use std::io::IsTerminal;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lexisplat::{Progress, Stage};
 use lexisplat_eval::format;
 
+use crate::bar::{self, lock};
 use crate::terminal::note;
 
 /// Duration of the longest command without a bar.
@@ -28,15 +29,6 @@ const LEAST_TIMED: Duration = Duration::from_millis(500);
 
 /// The current work of the command.
 static WORK: Mutex<Work> = Mutex::new(Work { outer: None, step: None });
-/// The bar of the command. It must never be locked while [`WORK`] is locked, because the thread that draws the bar locks
-/// them in the other order.
-static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
-
-/// Locks `mutex`. After a panic of a thread that held the lock, at worst a wrong line is on the screen.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// The current work of a command: a step, which may be part of larger work with several parts.
 #[derive(Debug)]
 struct Work {
@@ -147,7 +139,7 @@ pub(crate) fn show() {
         ProgressStyle::with_template("{wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
     if terminal {
-        *lock(&BAR) = Some(bar.clone());
+        bar::set(bar.clone());
     }
     // If the thread cannot be started, nothing is shown, and everything else works. The thread ends with the program.
     let _ = std::thread::Builder::new().name("progress".to_owned()).spawn(move || {
@@ -167,22 +159,6 @@ pub(crate) fn show() {
             std::thread::sleep(TICK);
         }
     });
-}
-
-/// Removes the bar from the screen for good.
-pub(crate) fn clear() {
-    if let Some(bar) = lock(&BAR).take() {
-        bar.finish_and_clear();
-    }
-}
-
-/// Calls `print` while the bar is off the screen.
-pub(crate) fn without_bar<T>(print: impl FnOnce() -> T) -> T {
-    let bar = lock(&BAR).clone();
-    match bar {
-        Some(bar) => bar.suspend(print),
-        None => print(),
-    }
 }
 
 /// Reports the steps of a command, unless the command is quiet.

@@ -3,8 +3,8 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use crate::bar;
 use crate::files::outputs;
-use crate::progress;
 use crate::terminal::note;
 
 /// The outputs that a command is writing. The line that is printed after a signal depends on them.
@@ -52,7 +52,7 @@ fn stopped_by(name: &str) -> bool {
         (Work::Files(_), 1) => "; 1 output is complete, no other was written".to_owned(),
         (Work::Files(_), n) => format!("; {n} outputs are complete, no other was written"),
     };
-    progress::clear();
+    bar::clear();
     note(&format!("error: stopped by {name}{outcome}"));
     true
 }

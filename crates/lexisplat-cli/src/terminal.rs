@@ -10,7 +10,7 @@ use lexisplat_eval::format;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::progress::without_bar;
+use crate::bar::without_bar;
 
 /// Name of standard output in messages.
 pub(crate) const STANDARD_OUTPUT: &str = "standard output";

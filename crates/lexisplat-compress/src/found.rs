@@ -11,7 +11,6 @@ use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_vi
 use crate::error::Result;
 use crate::natural_width::natural_width;
 use crate::observed_directions::ObservedDirections;
-use crate::packing_views::GENERATED_SIZE as SIZE;
 use crate::photo_views::{likelihood, turned};
 use crate::size_spread::{Sizes, SizesSeen};
 
@@ -24,6 +23,8 @@ const CHOICE: usize = 4;
 const PHOTO_SHARE: usize = 2;
 /// Approximate number of Gaussians drawn in all tried views together.
 const GAUSSIANS_DRAWN: usize = 128_000_000;
+/// Width and height of generated views, in pixels.
+pub(crate) const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Width and height of the small pictures, in pixels.
 const SMALL: [u32; 2] = [96, 64];
 /// Smallest opacity in the small pictures, 5 %, before the sigmoid.
@@ -105,10 +106,10 @@ pub(crate) fn find(
         }
     }
     if median < BARE {
-        judges = object(&splats.geometry, judging, SIZE[0], SIZE[1]);
+        judges = object(&splats.geometry, judging, GENERATED_SIZE[0], GENERATED_SIZE[1]);
     }
     let width = natural_width(&splats.geometry, &judges);
-    let height = (width * SIZE[1] / SIZE[0]).max(1);
+    let height = (width * GENERATED_SIZE[1] / GENERATED_SIZE[0]).max(1);
     for camera in best.iter_mut().chain(&mut judges) {
         *camera = camera.resized(width, height);
     }
@@ -129,7 +130,7 @@ struct Seen {
 /// Returns `count` natural views of `splats`, evenly spread over its opaque Gaussians in their order. Each is the
 /// one of a few neighbours from which Gaussians look most alike in size.
 pub(crate) fn evenly(splats: &Splats, count: usize) -> Vec<Camera> {
-    let views = natural_views(&splats.geometry, CHOICE * count, SIZE);
+    let views = natural_views(&splats.geometry, CHOICE * count, GENERATED_SIZE);
     let sizes = Sizes::of(&splats.geometry);
     let spread = |view: &&Camera| sizes.seen_from(view.position).spread;
     let least = |few: &[Camera]| few.iter().min_by(|a, b| spread(a).total_cmp(&spread(b))).cloned();
@@ -140,7 +141,7 @@ pub(crate) fn evenly(splats: &Splats, count: usize) -> Vec<Camera> {
 /// empty if no colour depends on the view. The second has views from which Gaussians look most alike in size. Without the
 /// first list it has `count` views; otherwise both have half as many.
 fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {
-    let views = natural_views(&splats.geometry, CHOICE * count, SIZE);
+    let views = natural_views(&splats.geometry, CHOICE * count, GENERATED_SIZE);
     let sizes = Sizes::of(&splats.geometry);
     let sizes: Vec<SizesSeen> = views.iter().map(|view| sizes.seen_from(view.position)).collect();
     let best = |cost: &dyn Fn(usize) -> f64, count: usize| {
@@ -202,7 +203,7 @@ mod tests {
     use super::*;
 
     fn found(splats: &Splats, counts: [usize; 2]) -> Found {
-        let more = surround(&splats.geometry, 8, SIZE, [2.0, 12.0]);
+        let more = surround(&splats.geometry, 8, GENERATED_SIZE, [2.0, 12.0]);
         find(&mut Renderer::cpu(), splats, more, counts, &Silent).unwrap()
     }
 
@@ -221,7 +222,7 @@ mod tests {
             };
             views.iter().map(|view| detail(&draw(view))).sum::<f64>() / views.len() as f64
         };
-        let others = natural_views(&splats.geometry, 60, SIZE);
+        let others = natural_views(&splats.geometry, 60, GENERATED_SIZE);
         assert!(mean_detail(&best) > 1.2 * mean_detail(&others));
         assert!(mean_detail(&judges) > 1.2 * mean_detail(&others));
     }
@@ -235,7 +236,7 @@ mod tests {
         splats.geometry.scales.iter_mut().for_each(|scales| *scales = scales.map(|s| s.min(-4.5)));
         let Found { judges, .. } = found(&splats, [10, 6]);
         let [width, height] = [judges[0].width, judges[0].height];
-        let ring = object(&splats.geometry, 6, SIZE[0], SIZE[1]);
+        let ring = object(&splats.geometry, 6, GENERATED_SIZE[0], GENERATED_SIZE[1]);
         let ring: Vec<Camera> = ring.iter().map(|camera| camera.resized(width, height)).collect();
         assert_eq!(judges, ring);
     }

@@ -1,5 +1,6 @@
 //! The score of a compressed scene over the views that judge.
 
+use lexisplat::packed::ReachedRecord;
 use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, squared_error};
 
@@ -149,4 +150,16 @@ pub struct Score {
     pub mean: f64,
     /// The lowest PSNR of a view.
     pub least: f64,
+}
+
+/// Returns the record of a score by `judge`.
+pub(crate) fn reached(score: Score, judge: &Judge) -> ReachedRecord {
+    let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
+    let psnr = [score.judged, score.mean, score.least].map(rounded_decibels);
+    ReachedRecord::new(psnr, views, judge.views_are_given())
+}
+
+/// Rounds decibels to the thousandths that are reported.
+fn rounded_decibels(decibels: f64) -> f64 {
+    (decibels * 1000.0).round() / 1000.0
 }

@@ -5,7 +5,7 @@ use lexisplat::{Geometry, Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
 
 use crate::error::{Error, Result};
-use crate::found::{Found, evenly, find};
+use crate::found::{Found, GENERATED_SIZE, evenly, find};
 use crate::sharp_views::sampled;
 use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints};
 
@@ -24,8 +24,6 @@ const MOST_FOUND_VIEWS: usize = 256;
 /// Number of found views that judge: the number of found views that measure over [`FOUND_JUDGE_SHARE`], within this range.
 const FOUND_JUDGES: std::ops::RangeInclusive<usize> = 24..=48;
 const FOUND_JUDGE_SHARE: usize = 4;
-/// Width and height of generated views, in pixels.
-pub(crate) const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Distances from which generated views measure, in radii of the scene's detail.
 const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
 /// Number of views evenly spread over the Gaussians of a part of a scene. A part may have some Gaussians far from all others, which

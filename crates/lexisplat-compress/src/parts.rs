@@ -12,7 +12,6 @@ use crate::packing_views::PackingViews;
 use crate::part_step::step_factor;
 use crate::refit::Fit;
 use crate::report::CompressionReport;
-use crate::tiles;
 
 /// Packs part by part to a PSNR of about `decibels`. A scene that is one part is packed whole. `renderer` draws the parts.
 /// If it is `None`, the sensitivity is guessed.
@@ -35,7 +34,7 @@ pub fn in_parts(
     let done = stream::pack(source, observer, options, decibels, sink, progress)?;
     let look_seconds = parts.map_or(0.0, |parts| parts.look_seconds);
     let pack_seconds = clock.seconds() - look_seconds;
-    Ok(CompressionReport { look_seconds, pack_seconds, ..tiles::report(&done, guessed) })
+    Ok(CompressionReport { look_seconds, pack_seconds, ..CompressionReport::in_parts(&done, guessed) })
 }
 
 /// Draws the parts of a scene.

@@ -1,12 +1,11 @@
 //! The report of a compression: the facts that programs print as text and as JSON.
 
 use lexisplat::packed::{PackedHead, ReachedRecord, TargetRecord};
-use lexisplat::stream::Compressed;
+use lexisplat::stream::{Compressed, PackedFile};
 use lexisplat::{CompressReport, Dictionary, Layout, Record, ShDegree};
 use serde::{Serialize, Serializer};
 
 use crate::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
-use crate::judge::{Judge, Score};
 use crate::target::MIN_PSNR;
 
 /// Largest usual difference of the judged quality and the worst view, in dB. A larger difference is a sign of views unlike
@@ -113,18 +112,6 @@ pub fn overshoot(target: &TargetRecord) -> Option<f64> {
     (target.kind == MIN_PSNR && above > MUCH_ABOVE).then_some(above)
 }
 
-/// Returns the record of a score by `judge`.
-pub(crate) fn reached(score: Score, judge: &Judge) -> ReachedRecord {
-    let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
-    let psnr = [score.judged, score.mean, score.least].map(rounded_decibels);
-    ReachedRecord::new(psnr, views, judge.views_are_given())
-}
-
-/// Rounds decibels to the thousandths that are reported.
-fn rounded_decibels(decibels: f64) -> f64 {
-    (decibels * 1000.0).round() / 1000.0
-}
-
 /// Origin of the sensitivity of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -193,6 +180,13 @@ impl CompressionReport {
             device: Some(head.device.as_deref().unwrap_or("cpu").to_owned()),
             ..Self::new(Layout::Packed, gaussians, degree, record, report, tensors)
         }
+    }
+
+    /// Returns the report of a file that was packed part by part. `guessed` tells whether the sensitivity was guessed.
+    pub(crate) fn in_parts(done: &PackedFile, guessed: bool) -> Self {
+        let origin = if guessed { SensitivitySource::Guess } else { SensitivitySource::Views };
+        let report = Self::packed(&done.head, &done.report, &done.tensor_bytes, origin);
+        Self { in_parts: true, ..report }
     }
 }
 

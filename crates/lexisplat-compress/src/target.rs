@@ -7,9 +7,8 @@ use lexisplat::packed::{Packed, Preset, ReachedRecord, TargetRecord};
 use lexisplat::{CompressReport, Progress, Splats};
 
 use crate::error::{Error, Result};
-use crate::judge::{Judge, Score};
+use crate::judge::{Judge, Score, reached};
 use crate::refit::{Refitted, Refitting};
-use crate::report::reached;
 
 /// Largest amount by which a quality may exceed the target, in dB.
 const CLOSE_DB: f64 = 0.1;

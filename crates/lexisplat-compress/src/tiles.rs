@@ -9,7 +9,7 @@ use lexisplat_render::Renderer;
 use crate::error::Result;
 use crate::parts;
 pub use crate::parts::in_parts;
-use crate::report::{CompressionReport, SensitivitySource};
+use crate::report::CompressionReport;
 
 /// Measures the sensitivity of a bucket with `renderer`, for the quality that `preset` aims at. Without a renderer the
 /// sensitivity is guessed from each Gaussian alone.
@@ -51,7 +51,5 @@ pub fn code(
 /// Returns the report of a file that was assembled from buckets. `guessed` tells whether their sensitivity was guessed.
 #[must_use]
 pub fn report(done: &PackedFile, guessed: bool) -> CompressionReport {
-    let origin = if guessed { SensitivitySource::Guess } else { SensitivitySource::Views };
-    let report = CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, origin);
-    CompressionReport { in_parts: true, ..report }
+    CompressionReport::in_parts(done, guessed)
 }

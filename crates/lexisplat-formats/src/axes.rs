@@ -91,9 +91,9 @@ mod tests {
         let q = [0.5, 0.1, -0.7, 0.5_f64];
         for flip in all() {
             for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
-                let expected = flip.position(crate::edit::turned(q, axis).map(|v| v as f32));
+                let expected = flip.position(crate::quaternion::turned(q, axis).map(|v| v as f32));
                 let flipped = flip.rotation(q.map(|v| v as f32)).map(f64::from);
-                let found = crate::edit::turned(flipped, axis).map(|v| v as f32);
+                let found = crate::quaternion::turned(flipped, axis).map(|v| v as f32);
                 let along: f32 = (0..3).map(|k| expected[k] * found[k]).sum();
                 assert!((along.abs() - 1.0).abs() < 1e-5, "{flip:?} {along}");
             }

@@ -2,6 +2,7 @@
 
 use lexisplat::{Error, Offset, Result, ShDegree, Splats};
 
+use crate::quaternion::{product, quaternion, turned};
 use crate::turn_sh::ShRotation;
 
 /// Changes of a scene, which are made in the order of the fields. Coordinates are along the axes of a trainer's PLY, in
@@ -110,35 +111,6 @@ fn scale_by(splats: &mut Splats, scale: f64) {
     let geometry = &mut splats.geometry;
     geometry.positions.as_flattened_mut().iter_mut().for_each(|v| *v = single(f64::from(*v) * scale));
     geometry.scales.as_flattened_mut().iter_mut().for_each(|v| *v += more);
-}
-
-/// Returns the quaternion (w, x, y, z) of rotations by `angles`, in degrees, about x, then y, then z.
-fn quaternion(angles: [f64; 3]) -> [f64; 4] {
-    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(|angle| libm::sincos(angle.to_radians() / 2.0));
-    product([cz, 0.0, 0.0, sz], product([cy, 0.0, sy, 0.0], [cx, sx, 0.0, 0.0]))
-}
-
-/// Returns the rotation by `b` followed by the rotation by `a`.
-pub(crate) fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
-    let ([aw, ax, ay, az], [bw, bx, by, bz]) = (a, b);
-    [
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    ]
-}
-
-/// Returns `v` rotated by the quaternion `q`, of length 1.
-pub(crate) fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
-    let [w, x, y, z] = q;
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
-    let u = [x, y, z];
-    let once = cross(u, v);
-    let twice = cross(u, once);
-    [0, 1, 2].map(|k| v[k] + 2.0 * (w * once[k] + twice[k]))
 }
 
 /// Rotates a scene about the origin by the quaternion `q`, of length 1.

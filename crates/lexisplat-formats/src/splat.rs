@@ -9,9 +9,9 @@ use lexisplat::ply::ReadOptions;
 use lexisplat::sh::{C0, COLOUR_OFFSET};
 use lexisplat::{Error, FormatError, Result, SceneMeta, ShDegree, Splats};
 
+use crate::lost::Lost;
 use crate::opacity::{MOST, logits, sigmoid, to_byte};
 use crate::rows::{Described, Rows, RowsMut};
-use crate::write::Lost;
 
 /// Number of bytes of a Gaussian.
 const ROW: usize = 32;

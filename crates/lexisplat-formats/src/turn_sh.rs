@@ -7,7 +7,7 @@
 use lexisplat::ShDegree;
 use lexisplat::sh::{MAX_COEFFICIENTS, MAX_DEGREE, rest_basis};
 
-use crate::edit::turned;
+use crate::quaternion::turned;
 
 /// Heights and weights of Gauss-Legendre quadrature with five values, which is exact for polynomials of degree 9.
 const HEIGHTS: [(f64, f64); 5] = [

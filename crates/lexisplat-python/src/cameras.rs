@@ -7,7 +7,7 @@ use lexisplat_compress::judging_views;
 use lexisplat_render::{Camera, Device, Renderer, Split, orbit as orbit_around, read_views};
 use pyo3::prelude::*;
 
-use crate::draw::Subject;
+use crate::subject::Subject;
 use crate::work::without_gil;
 
 /// Name, width, height, focal lengths along x and y, position in the world, rotation from camera to world, distance of

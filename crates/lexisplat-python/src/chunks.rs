@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{ShOrder, to_python};
 use crate::errors::{Result, raise};
-use crate::scene::Held;
+use crate::held::Held;
 use crate::work::POLL;
 
 /// Largest number of decoded parts that wait to be taken. With the part being decoded they bound the memory.

@@ -13,10 +13,12 @@ mod chunks;
 mod draw;
 mod errors;
 mod files;
+mod held;
 mod invalid;
 mod learn;
 mod metrics;
 mod scene;
+mod subject;
 mod tiles;
 mod work;
 

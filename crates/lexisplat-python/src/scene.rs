@@ -1,11 +1,11 @@
-//! A .lexi file whose bytes are held in memory. It is decoded when a decoded form is needed.
+//! A compressed scene: a .lexi file whose bytes are held in memory.
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::Arc;
 
 use lexisplat::lexi::LexiReader;
-use lexisplat::{Indices, Limits, Model, SplatSource as _, Values, stream};
+use lexisplat::{Indices, Limits, SplatSource as _, Values, stream};
 use lexisplat_compress::{RecordReport, part_bytes};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -15,42 +15,10 @@ use serde_json::json;
 use crate::arrays::{ShOrder, to_python, vector};
 use crate::bytes::{Bytes, Given, limits};
 use crate::chunks::Chunks;
-use crate::errors::{Result, raise};
+use crate::errors::raise;
 use crate::files::{json, output};
+use crate::held::Held;
 use crate::work::{check_process, without_gil};
-
-/// The bytes of a .lexi file, and its reader and its model once they were needed.
-#[derive(Debug)]
-pub(crate) struct Held {
-    name: String,
-    bytes: Bytes,
-    limits: Limits,
-    reader: OnceLock<LexiReader<'static>>,
-    model: Mutex<Option<Arc<Model>>>,
-}
-
-impl Held {
-    /// Returns the reader. It is kept, because opening it decodes the dictionary and the tables.
-    pub(crate) fn reader(&self) -> Result<&LexiReader<'static>> {
-        if let Some(reader) = self.reader.get() {
-            return Ok(reader);
-        }
-        let reader = LexiReader::open(self.name.as_str(), self.bytes.clone(), &self.limits)?;
-        Ok(self.reader.get_or_init(|| reader))
-    }
-
-    /// Returns the decoded file, which is kept.
-    pub(crate) fn model(&self) -> Result<Arc<Model>> {
-        let mut kept = self.model.lock().unwrap_or_else(PoisonError::into_inner);
-        match &*kept {
-            Some(model) => Ok(Arc::clone(model)),
-            None => {
-                let model = Arc::new(self.reader()?.model()?);
-                Ok(Arc::clone(kept.insert(model)))
-            }
-        }
-    }
-}
 
 /// A compressed scene.
 #[pyclass(frozen, module = "lexisplat._native")]
@@ -63,8 +31,7 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn new(name: String, bytes: Bytes, limits: Limits, report: Option<String>) -> Self {
-        let (reader, model) = (OnceLock::new(), Mutex::default());
-        Self { held: Arc::new(Held { name, bytes, limits, reader, model }), report }
+        Self { held: Arc::new(Held::new(name, bytes, limits)), report }
     }
 
     fn reader(&self, py: Python<'_>) -> PyResult<&LexiReader<'static>> {

@@ -3,11 +3,13 @@
 use glam::DVec3;
 use lexisplat::Geometry;
 
+use crate::bulk::{TRIM, bulk, middle, opacity_weights};
 use crate::camera::Camera;
 use crate::near::near_plane;
-use crate::object::{object, subject};
-use crate::orbit::{TRIM, UP, axes, bulk, middle, opacity_weights, pinhole};
-use crate::surround::{PLASTIC, detail};
+use crate::object::object;
+use crate::orbit::{UP, axes, pinhole};
+use crate::subject::{detail, subject};
+use crate::surround::PLASTIC;
 use crate::transmittance::{Ray, transmittances};
 
 /// Number of tried views of [`object`].

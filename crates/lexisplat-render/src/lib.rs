@@ -43,6 +43,7 @@
 extern crate self as lexisplat_render;
 
 mod aside;
+mod bulk;
 mod camera;
 mod cameras_json;
 mod colmap;
@@ -64,6 +65,7 @@ mod read_views;
 mod renderer;
 mod scene;
 mod squared_error;
+mod subject;
 mod surround;
 mod tile_set;
 mod transforms;
@@ -74,6 +76,7 @@ mod view_set;
 mod wait;
 
 pub use aside::aside;
+pub use bulk::bulk;
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, read_cameras_bytes};
 pub use colmap::{MAX_COLMAP_BYTES, read_colmap_binary, read_colmap_text};
@@ -85,8 +88,8 @@ pub use image::Image;
 pub use interior_views::{interior_views, is_interior};
 pub use natural_views::natural_views;
 pub use near::{hidden_share, near_plane};
-pub use object::{object, subject};
-pub use orbit::{bulk, orbit};
+pub use object::object;
+pub use orbit::orbit;
 pub use radiance::Radiance;
 #[cfg(not(target_family = "wasm"))]
 pub use read_views::{read_cameras, read_colmap, read_views};
@@ -94,6 +97,7 @@ pub use read_views::{read_view_files, read_views_bytes};
 pub use renderer::{Device, Prepared, Renderer};
 pub use scene::Scene;
 pub use squared_error::squared_error;
+pub use subject::subject;
 pub use surround::{PLASTIC, surround};
 pub use tile_set::TileSet;
 pub use transforms::read_transforms_bytes;

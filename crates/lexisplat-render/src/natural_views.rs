@@ -6,9 +6,10 @@
 use glam::DVec3;
 use lexisplat::Geometry;
 
+use crate::bulk::opacity_weights;
 use crate::camera::Camera;
 use crate::near::near_plane;
-use crate::orbit::{axes, opacity_weights, pinhole};
+use crate::orbit::{axes, pinhole};
 use crate::surround::PLASTIC;
 use crate::transmittance::unit_rotation;
 

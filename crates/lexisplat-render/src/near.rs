@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use lexisplat::Geometry;
 
+use crate::bulk::size_at;
 use crate::camera::{Camera, single};
-use crate::object::subject;
-use crate::orbit::size_at;
+use crate::subject::subject;
 
 /// Largest distance of the near plane, in radii of the subject.
 const NEAR_RADII: f64 = 0.1;

@@ -4,15 +4,8 @@ use lexisplat::Geometry;
 
 use crate::camera::Camera;
 use crate::near::near_plane;
-use crate::orbit::{bulk, ring};
-use crate::surround::detail;
-
-/// Smallest ratio of the bulk's radius to the detail's radius at which the detail is the subject, as for an object before
-/// a background. The ratio is 11 for bonsai, 7 for flowers, and 1 to 2 if there is only an object.
-const BACKGROUND: f64 = 4.0;
-/// Radius of the subject, in half diagonals of the detail's box. Photos of a centrepiece are taken from 3 to 6 half
-/// diagonals; this radius makes it 4.
-const AIR: f64 = 1.8;
+use crate::orbit::ring;
+use crate::subject::subject;
 
 /// Returns `count` cameras on a ring around the [`subject`] of `geometry`. The ring and the names of the cameras are like
 /// those of [`crate::orbit`], which goes around the bulk.
@@ -21,20 +14,10 @@ pub fn object(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec
     ring(subject(geometry), count, [width, height], near_plane(geometry))
 }
 
-/// Returns the centre and radius of the subject, in world units. The subject is the region of most of the small opaque
-/// Gaussians if this region is a small part of the scene; otherwise it is the [`bulk`].
-#[must_use]
-pub fn subject(geometry: &Geometry) -> ([f64; 3], f64) {
-    let (centre, radius) = bulk(geometry);
-    let (finest, half) = detail(geometry);
-    let fine = half.length();
-    // A detail without extent is a single Gaussian or none.
-    if fine > 0.0 && radius > BACKGROUND * fine { (finest.to_array(), fine * AIR) } else { (centre, radius) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bulk::bulk;
 
     /// A ball of 500 small Gaussians of radius 1 around (5, -2, 7), and as many large ones `far` away from it.
     fn before(far: f64) -> Geometry {

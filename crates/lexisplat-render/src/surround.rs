@@ -3,12 +3,12 @@
 use glam::DVec3;
 use lexisplat::Geometry;
 
+use crate::bulk::least_radius;
 use crate::camera::Camera;
 use crate::near::near_plane;
-use crate::orbit::{axes, least_radius, middle, pinhole};
+use crate::orbit::{axes, pinhole};
+use crate::subject::detail;
 
-/// Share of the detail at either end of each axis that is excluded from its radius.
-const TRIM: f64 = 0.2;
 /// Angle between neighbouring points of a Fibonacci spiral: the golden angle.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 /// Steps of the low-discrepancy sequences that spread distances and the points looked at. They are powers of the
@@ -51,21 +51,6 @@ pub fn surround(geometry: &Geometry, count: usize, size: [u32; 2], distances: [f
             pinhole(format!("surround_{i:03}"), size, focal, position, axes(forward, up)).with_near(plane)
         })
         .collect()
-}
-
-/// Returns the centre of the detail, and half its extent along each axis.
-pub(crate) fn detail(geometry: &Geometry) -> (DVec3, DVec3) {
-    let weights: Vec<f64> = geometry
-        .opacities
-        .iter()
-        .zip(&geometry.scales)
-        .map(|(&o, scales)| {
-            let mut sorted = scales.map(f64::from);
-            sorted.sort_by(f64::total_cmp);
-            libm::exp((-sorted[1] - sorted[2]).clamp(-60.0, 60.0)) / (1.0 + libm::exp(f64::from(-o)))
-        })
-        .collect();
-    middle(geometry, &weights, TRIM)
 }
 
 #[cfg(test)]

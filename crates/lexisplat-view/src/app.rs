@@ -1,4 +1,4 @@
-//! The window. It takes keys and the events of its threads, shows its parts, and continues the script.
+//! The state of the window. It takes keys and the events of its threads, and asks for pictures.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -18,7 +18,6 @@ use crate::error::{Error, Result};
 use crate::given_cameras::GivenCameras;
 use crate::keys;
 use crate::models::{FinishedJob, Job, Notifier, OpenModel, OrbitSize};
-use crate::panel;
 use crate::present::Presenter;
 use crate::render_thread::{Frame, RenderEvent, RenderRequest, RenderThread, Score, View};
 use crate::scene_renderer::{CpuSceneRenderer, GpuSceneRenderer, SceneRenderer};
@@ -76,9 +75,9 @@ pub(crate) struct App {
     /// Whether the wipe's line is being dragged.
     pub(crate) dragging_split: bool,
     pub(crate) messages: VecDeque<Message>,
-    script: Script,
+    pub(crate) script: Script,
     /// Whether the script is still running.
-    scripted: bool,
+    pub(crate) scripted: bool,
     /// Whether the window closes after this frame.
     pub(crate) quit: bool,
     /// Sender of the errors with which the program ends. The first error counts.
@@ -214,7 +213,7 @@ impl App {
     }
 
     /// Handles finished jobs, events of the render thread and errors of the driver.
-    fn process_events(&mut self) {
+    pub(crate) fn process_events(&mut self) {
         while let Ok(FinishedJob { id, slot, result }) = self.finished.try_recv() {
             let place = &mut self.jobs[slot.index()];
             if place.as_ref().is_none_or(|job| job.id != id) {
@@ -307,7 +306,7 @@ impl App {
     }
 
     /// Requests the wanted view if the frame on screen is of another view.
-    fn request_frame(&mut self, context: &egui::Context) {
+    pub(crate) fn request_frame(&mut self, context: &egui::Context) {
         let moving = self.is_moving();
         if moving {
             // A frame after the end of the motion draws in full resolution.
@@ -326,12 +325,12 @@ impl App {
     }
 
     /// Returns whether everything that was requested is done.
-    fn is_settled(&self) -> bool {
+    pub(crate) fn is_settled(&self) -> bool {
         let drawn = self.wanted_view().is_none_or(|view| self.shows(&view));
         drawn && !self.drawing && self.saving == 0 && self.jobs.iter().all(Option::is_none)
     }
 
-    fn keys(&mut self, context: &egui::Context) {
+    pub(crate) fn keys(&mut self, context: &egui::Context) {
         if context.egui_wants_keyboard_input() {
             return;
         }
@@ -359,7 +358,7 @@ impl App {
         }
     }
 
-    fn dropped(&mut self, context: &egui::Context) {
+    pub(crate) fn dropped(&mut self, context: &egui::Context) {
         let (paths, first) = context.input(|input| {
             let paths: Vec<_> = input.raw.dropped_files.iter().map(|file| file.path().to_owned()).collect();
             (paths, input.modifiers.shift)
@@ -386,31 +385,4 @@ fn renderer(device: Device, graphics: &RenderState) -> Result<(Box<dyn SceneRend
         Device::Auto | Device::Cpu => None,
     };
     Ok((Box::new(CpuSceneRenderer::new(graphics.device.clone())), gpu_error))
-}
-
-impl eframe::App for App {
-    fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
-        let context = ui.ctx().clone();
-        self.process_events();
-        self.keys(&context);
-        self.dropped(&context);
-        if self.state.panel() {
-            for command in panel::show(self, ui) {
-                self.handle(command);
-            }
-        }
-        self.viewport(ui);
-        self.request_frame(&context);
-        if self.scripted && !self.quit && self.is_settled() {
-            match self.script.pop_front() {
-                Some(command) => self.handle(command),
-                // The script has ended. Later errors are shown and do not end the program.
-                None => self.scripted = false,
-            }
-            context.request_repaint();
-        }
-        if self.quit {
-            context.send_viewport_cmd(egui::ViewportCommand::Close);
-        }
-    }
 }

@@ -89,6 +89,8 @@ mod state;
 mod viewport;
 #[cfg(feature = "window")]
 mod window;
+#[cfg(feature = "window")]
+mod window_frame;
 
 pub use camera_controller::{CameraController, SceneBounds, fitted};
 pub use command::{Command, Mode, Quality, Slot};

@@ -7,8 +7,8 @@ use lexisplat::{Geometry, ShDegree, Splats, ply};
 use super::code::{Bounds, to_code, to_rotation, to_three};
 use super::order::order;
 use super::{CHUNK, CHUNK_PROPERTIES, ChunkBounds, ROW, SH_LEVELS, SH_RANGE, VERTEX_PROPERTIES, colour, dc};
+use crate::lost::Lost;
 use crate::opacity::{sigmoid, to_byte};
-use crate::write::Lost;
 
 /// Largest absolute logarithm of a scale (`compressed-chunk.ts`).
 const MOST_LOG_SCALE: f32 = 20.0;

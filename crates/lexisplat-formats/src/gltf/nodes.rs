@@ -90,7 +90,7 @@ fn local(name: &str, index: usize, node: &Node) -> Result<Matrix> {
         }
         let q = [w, x, y, z].map(|v| v / length);
         for column in &mut matrix[..3] {
-            *column = crate::edit::turned(q, *column);
+            *column = crate::quaternion::turned(q, *column);
         }
     }
     let scale = node.scale.unwrap_or([1.0; 3]);

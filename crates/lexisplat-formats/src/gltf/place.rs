@@ -4,7 +4,7 @@ use lexisplat::{Error, Offset, Result, ShDegree};
 
 use super::nodes::Matrix;
 use crate::axes::Flip;
-use crate::edit::{product, turned};
+use crate::quaternion::{product, turned};
 use crate::rows::RowsMut;
 use crate::turn_sh::ShRotation;
 

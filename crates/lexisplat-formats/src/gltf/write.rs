@@ -12,11 +12,12 @@ use super::json::{Attribute, Root};
 use super::place::GLTF;
 use super::{attribute, rest_attributes};
 use crate::axes::Flip;
+use crate::lost::Lost;
 use crate::opacity::to_byte;
 use crate::rows::RowsMut;
 use crate::settle::settled;
 use crate::spz;
-use crate::write::{Lost, WriteOptions};
+use crate::write_options::WriteOptions;
 
 /// Highest SH degree of the extension.
 const MOST_DEGREE: u8 = 3;

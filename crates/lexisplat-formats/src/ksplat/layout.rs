@@ -3,6 +3,8 @@
 
 use lexisplat::{Error, FormatError, Result, ShDegree};
 
+use super::values::{f32_at, u16_at};
+
 /// Number of bytes of the file's header (`SplatBuffer.HeaderSizeBytes`).
 pub(super) const HEADER: usize = 4096;
 /// Number of bytes of a section's header (`SplatBuffer.SectionHeaderSizeBytes`).
@@ -111,7 +113,7 @@ impl Section<'_> {
             self.full + self.ends.partition_point(|&end| end <= i)
         };
         let centre = &self.centres[bucket];
-        [0, 4, 8].map(|at| super::f32_at(centre, at))
+        [0, 4, 8].map(|at| f32_at(centre, at))
     }
 }
 
@@ -138,14 +140,13 @@ impl<'a> Layout<'a> {
         if major != 0 || minor == 0 {
             return Err(bad(format!("version {major}.{minor} of .ksplat is not known")));
         }
-        let number = super::u16_at(header, 20);
+        let number = u16_at(header, 20);
         let level =
             Level::of(number).ok_or_else(|| bad(format!("compression level {number} is not 0, 1 or 2")))?;
         let headers = size(u32_at(header, 4)).saturating_mul(SECTION_HEADER);
         let headers = take(name, "the headers of sections", bytes, &mut rest, headers)?;
         let or = |value: f32, default: f32| if value == 0.0 { default } else { value };
-        let sh_range =
-            [or(super::f32_at(header, 36), -DEFAULT_SH), or(super::f32_at(header, 40), DEFAULT_SH)];
+        let sh_range = [or(f32_at(header, 36), -DEFAULT_SH), or(f32_at(header, 40), DEFAULT_SH)];
         let mut sections = Vec::new();
         let mut gaussians = 0_usize;
         for (s, header) in headers.as_chunks::<SECTION_HEADER>().0.iter().enumerate() {
@@ -178,8 +179,8 @@ fn section<'a>(
     let bad = |text: String| Error::malformed(name, format!("section {s}: {text}"));
     let [len, most, capacity, buckets] = [0, 4, 8, 12].map(|at| size(u32_at(header, at)));
     let [full, partial] = [32, 36].map(|at| size(u32_at(header, at)));
-    let bucket_bytes = usize::from(super::u16_at(header, 20));
-    let degree = super::u16_at(header, 40);
+    let bucket_bytes = usize::from(u16_at(header, 20));
+    let degree = u16_at(header, 40);
     let degree = u8::try_from(degree)
         .ok()
         .filter(|_| degree <= MAX_DEGREE)
@@ -197,7 +198,7 @@ fn section<'a>(
     let centres = take(name, &what("centres"), bytes, rest, buckets.saturating_mul(bucket_bytes))?;
     let row_bytes = level.row_bytes(degree);
     let rows = take(name, &what("the Gaussians"), bytes, rest, most.saturating_mul(row_bytes))?;
-    let block = super::f32_at(header, 16);
+    let block = f32_at(header, 16);
     let range = match u32_at(header, 24) {
         0 => DEFAULT_RANGE,
         range => range,

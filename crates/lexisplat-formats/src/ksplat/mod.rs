@@ -5,6 +5,7 @@
 //! centre of their bucket. The axes are those of a PLY. [`layout`] checks all values that control reading.
 
 mod layout;
+mod values;
 
 use std::ops::Range;
 
@@ -15,6 +16,7 @@ use lexisplat::{Result, SceneMeta, ShDegree};
 use serde_json::json;
 
 use self::layout::{Layout, Level, Section};
+use self::values::{f32_at, u16_at};
 use crate::opacity::{MOST, logits};
 use crate::rows::{Described, Rows, RowsMut};
 
@@ -150,14 +152,6 @@ fn sh(layout: &Layout<'_>, degree: ShDegree, reader: RowReader<'_>, out: &mut [f
         }
         first += n;
     }
-}
-
-fn u16_at(bytes: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes([bytes[at], bytes[at + 1]])
-}
-
-fn f32_at(bytes: &[u8], at: usize) -> f32 {
-    f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
 #[cfg(test)]

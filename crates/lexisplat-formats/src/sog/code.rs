@@ -1,5 +1,7 @@
 //! Positions in 16 bits and rotations in 8 bits, as in splat-transform (`write-sog.ts`, `read-sog.ts`).
 
+/// Number of values of a byte.
+pub(super) const LEVELS: usize = 256;
 /// Largest code of a position.
 pub(super) const MOST_CODE: f64 = 65_535.0;
 /// Largest byte.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::LEVELS;
+use super::code::LEVELS;
 
 /// Number of groups of values that the search works on.
 const BINS: usize = 4096;

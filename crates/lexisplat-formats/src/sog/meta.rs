@@ -3,8 +3,7 @@
 use lexisplat::{Error, FormatError, Result, ShDegree};
 use serde::Deserialize;
 
-use super::LEVELS;
-use super::code::{lerp, position};
+use super::code::{LEVELS, lerp, position};
 use crate::opacity::{MOST, logits};
 
 /// Version that is written. A file without a version has version 1.

@@ -15,6 +15,7 @@ mod palette;
 mod picture;
 mod streamed;
 mod tree;
+mod vectors;
 mod write;
 
 use std::ops::Range;
@@ -35,8 +36,6 @@ pub(crate) use self::write::write;
 
 /// Name of the file that describes the others.
 const META: &str = "meta.json";
-/// Number of values of a byte.
-const LEVELS: usize = 256;
 /// Number of entries of the palette in a row of its picture.
 const ENTRIES_PER_ROW: usize = 64;
 /// Largest number of entries of a palette. Their indices have 16 bits.

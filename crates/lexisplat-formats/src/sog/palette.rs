@@ -11,9 +11,8 @@ use std::collections::HashMap;
 use lexisplat::{Progress, Result};
 
 use super::tree;
+use super::vectors::{Rows, add, distance};
 
-/// Number of sums that are taken side by side. Widths of rows are multiples of it.
-pub(super) const LANES: usize = 8;
 /// Number of rounds of Lloyd's algorithm.
 const ROUNDS: usize = 6;
 /// Number of groups of entries whose entries a row is compared with.
@@ -24,25 +23,6 @@ const MOST_GROUPS: usize = 512;
 const MOST_TRAINING: usize = 1 << 20;
 /// Number of rows of one task.
 const ROWS_PER_TASK: usize = 1024;
-
-/// Rows of numbers.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rows<'a> {
-    /// Values of all rows, row by row.
-    pub(super) values: &'a [f32],
-    /// Number of values of a row, a multiple of [`LANES`]. The last values may be padding, which is 0.
-    pub(super) width: usize,
-}
-
-impl<'a> Rows<'a> {
-    pub(super) fn len(self) -> usize {
-        self.values.len() / self.width
-    }
-
-    pub(super) fn get(self, i: usize) -> &'a [f32] {
-        &self.values[i * self.width..(i + 1) * self.width]
-    }
-}
 
 /// The entries, and the index of each row's entry.
 #[derive(Debug, PartialEq)]
@@ -110,24 +90,6 @@ fn by_appearance(entries: &[f32], mut labels: Vec<u32>, width: usize) -> Palette
         *label = *place;
     }
     Palette { entries: ordered, labels }
-}
-
-/// Returns the squared distance of two rows.
-pub(super) fn distance(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; LANES];
-    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
-        for k in 0..LANES {
-            let v = a[k] - b[k];
-            sums[k] += v * v;
-        }
-    }
-    let [a, b, c, d, e, f, g, h] = sums;
-    ((a + b) + (c + d)) + ((e + f) + (g + h))
-}
-
-/// Adds a row to `sums`.
-pub(super) fn add(sums: &mut [f64], row: &[f32]) {
-    sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += f64::from(*v));
 }
 
 /// Entries in groups of similar entries.
@@ -264,6 +226,7 @@ mod tests {
     use lexisplat::{Error, Silent};
     use lexisplat_testing::Random;
 
+    use super::super::vectors::LANES;
     use super::*;
 
     fn rows(count: usize, width: usize) -> Vec<f32> {

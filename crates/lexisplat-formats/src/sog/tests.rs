@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::*;
 use crate::open::open;
-use crate::write::WriteOptions;
+use crate::write_options::WriteOptions;
 
 /// Gaussians of the scene.
 pub(super) const GAUSSIANS: usize = 300;

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use lexisplat::{Progress, Result};
 
-use super::palette::{Rows, add, distance};
+use super::vectors::{LANES, Rows, add, distance};
 
 /// Number of steps of the search for the direction of the largest spread.
 const POWER_STEPS: usize = 3;
@@ -126,11 +126,11 @@ fn cut(rows: Rows<'_>, members: &mut [usize], mean: &[f64], scratch: &mut Vec<us
 
 /// Returns the distance of `row` from `mean` along `direction`.
 fn along(row: &[f32], mean: &[f32], direction: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; super::palette::LANES];
+    let mut sums = [0.0_f32; LANES];
     let lanes = row.as_chunks().0.iter().zip(mean.as_chunks().0).zip(direction.as_chunks().0);
     for ((row, mean), direction) in lanes {
         for k in 0..sums.len() {
-            let [row, mean, direction]: [&[f32; super::palette::LANES]; 3] = [row, mean, direction];
+            let [row, mean, direction]: [&[f32; LANES]; 3] = [row, mean, direction];
             sums[k] += (row[k] - mean[k]) * direction[k];
         }
     }

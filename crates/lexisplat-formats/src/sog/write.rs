@@ -4,13 +4,15 @@ use lexisplat::sh::CHANNELS;
 use lexisplat::{Error, Progress, Result, ShDegree, Splats};
 use serde_json::{Value, json};
 
-use super::code::{to_log, to_position, to_rotation};
+use super::code::{LEVELS, to_log, to_position, to_rotation};
 use super::codebook::{codebook, nearest};
-use super::palette::{LANES, Rows, palette};
+use super::palette::palette;
 use super::picture::{self, MOST_SIDE};
-use super::{ENTRIES_PER_ROW, LEVELS, META, MOST_ENTRIES, archive, meta::VERSION};
+use super::vectors::{LANES, Rows};
+use super::{ENTRIES_PER_ROW, META, MOST_ENTRIES, archive, meta::VERSION};
+use crate::lost::Lost;
 use crate::opacity::{sigmoid, to_byte};
-use crate::write::{Lost, WriteOptions};
+use crate::write_options::WriteOptions;
 
 /// Factor of the sides of pictures (`write-sog.ts`).
 const SIDE_STEP: usize = 4;

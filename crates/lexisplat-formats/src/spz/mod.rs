@@ -233,7 +233,7 @@ mod tests {
     use super::*;
     use crate::open::open;
     use crate::siblings::Siblings;
-    use crate::write::WriteOptions;
+    use crate::write_options::WriteOptions;
 
     fn opened(bytes: &[u8]) -> Result<Splats> {
         let opened = open("a.spz", bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent)?;

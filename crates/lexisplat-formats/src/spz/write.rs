@@ -7,8 +7,9 @@ use super::header::{FIRST_ZSTD, Header, STREAMS};
 use super::inflate::{gzip, zstd};
 use super::{COLOUR_SCALE, ENTRY, SCALE_LEAST, SCALE_STEPS, SH_ZERO, rotation};
 use crate::axes::Flip;
+use crate::lost::Lost;
 use crate::opacity::{MOST, sigmoid, to_byte};
-use crate::write::{Lost, WriteOptions};
+use crate::write_options::WriteOptions;
 
 /// Number of bits of the fraction of positions, if the scene is small enough (`packGaussians`).
 const FRACTION: u8 = 12;

@@ -1,13 +1,11 @@
 //! GPU buffers. Their bytes are counted while they exist.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-
 use bytemuck::Pod;
 use wgpu::BufferUsages as Usages;
 
 use crate::error::{Error, Result};
 
+use super::counted::Counted;
 use super::device::Gpu;
 
 /// Smallest size of a buffer, in bytes: the size of the largest type in a binding.
@@ -25,27 +23,6 @@ pub(super) struct Buffer {
 impl Buffer {
     pub(super) fn bytes(&self) -> u64 {
         self.counted.size
-    }
-}
-
-/// Bytes on the GPU. They are counted until this value is dropped.
-#[derive(Debug)]
-pub(super) struct Counted {
-    pub(super) size: u64,
-    total: Arc<AtomicU64>,
-}
-
-impl Counted {
-    /// Adds `size` to `total`.
-    pub(super) fn new(size: u64, total: &Arc<AtomicU64>) -> Self {
-        total.fetch_add(size, Relaxed);
-        Self { size, total: Arc::clone(total) }
-    }
-}
-
-impl Drop for Counted {
-    fn drop(&mut self) {
-        self.total.fetch_sub(self.size, Relaxed);
     }
 }
 

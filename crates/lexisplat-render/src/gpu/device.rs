@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::renderer::Device;
 use crate::wait::answer;
 
-use super::buffer::Counted;
+use super::counted::Counted;
 
 /// Advice for a machine without an adapter.
 const NO_ADAPTER: &str = "no GPU adapter was found; install a Vulkan driver and loader (Debian and Ubuntu: mesa-vulkan-drivers and libvulkan1), or draw with the CPU renderer";

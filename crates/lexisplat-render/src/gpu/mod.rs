@@ -21,9 +21,11 @@
 //! a browser the futures need something that polls the device, such as `Gpu::wait` on another thread.
 
 mod buffer;
+mod capacity;
 mod chunks;
 mod columns;
 mod constants;
+mod counted;
 mod device;
 mod form;
 mod moments;

@@ -4,8 +4,8 @@ use crate::cpu::Moments;
 use crate::error::Result;
 
 use super::buffer::Buffer;
+use super::capacity::{Capacity, WORD};
 use super::device::Gpu;
-use super::work::{Capacity, WORD};
 
 /// Largest number of bytes of moments at once: 1 GiB, or less if a kernel can see less.
 pub(super) const MAX_BYTES: u64 = 1 << 30;

@@ -6,13 +6,14 @@ use std::sync::{Arc, Weak};
 use crate::error::Result;
 
 use super::buffer::Buffer;
+use super::capacity::PIXEL;
 use super::chunks::ChunkBuffers;
 use super::constants::{Counter, DIGIT_BITS, Dispatch, MAX_GROUPS, SCAN_BLOCK};
 use super::device::Gpu;
 use super::scene::GpuScene;
 use super::shaders::{Kernels, all_from, bind};
 use super::uniforms::{Band, ChunkUniform, Pass, Scan};
-use super::work::{PIXEL, Work};
+use super::work::Work;
 
 use crate::conventions::TILE;
 

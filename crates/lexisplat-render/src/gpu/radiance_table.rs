@@ -12,8 +12,8 @@ use wgpu::util::DeviceExt;
 use crate::error::{Error, Result};
 use crate::parallel::*;
 
-use super::buffer::Counted;
 use super::constants::TABLE_SIDE;
+use super::counted::Counted;
 use super::device::Gpu;
 
 /// Faces of a cube: +x, -x, +y, -y, +z, -z.

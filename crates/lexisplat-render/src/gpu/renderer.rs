@@ -10,6 +10,7 @@ use crate::cpu::RenderOptions;
 use crate::error::{Error, Result};
 use crate::image::Image;
 
+use super::capacity::{Capacity, ENTRY_ELEMENT, PIXEL, SLOT_ELEMENT};
 use super::constants::{COUNTERS, Counter};
 use super::device::Gpu;
 use super::path::ShPath;
@@ -18,7 +19,7 @@ use super::scene::GpuScene;
 use super::shaders::{DRAWING, Kernels, kernels};
 use super::timestamps::Timestamps;
 use super::uniforms::FrameUniform;
-use super::work::{Capacity, ENTRY_ELEMENT, PIXEL, SLOT_ELEMENT, Work};
+use super::work::Work;
 
 /// Number of slots and entries that the first buffers hold.
 const FIRST_ROOM: u32 = 1 << 18;

@@ -8,12 +8,12 @@ use crate::camera::Camera;
 use crate::cpu::{Moments, Projection, RenderOptions, carry};
 use crate::error::{Error, Result};
 
+use super::capacity::WORD;
 use super::moments::{MAX_BYTES, MOMENTS_BYTES};
 use super::renderer::{CapacityLimits, GpuRenderer};
 use super::scene::GpuScene;
 use super::shaders::{self, MEASURING};
 use super::uniforms::ChunkUniform;
-use super::work::WORD;
 
 impl GpuRenderer {
     /// Blocks on [`Self::sensitivity_async`].

@@ -4,12 +4,12 @@ use std::num::NonZeroU64;
 
 use crate::error::{Error, Result};
 
+use super::capacity::{PIXEL, WORD};
 use super::constants::{ERROR_PIXELS, GROUP};
 use super::plan::dimensions;
 use super::renderer::GpuRenderer;
 use super::shaders::{all_from, bind};
 use super::uniforms::Extent;
-use super::work::{PIXEL, WORD};
 
 /// Number of pixels that a workgroup compares.
 const GROUP_PIXELS: u32 = GROUP * ERROR_PIXELS;

@@ -3,27 +3,11 @@
 use crate::error::Result;
 
 use super::buffer::Buffer;
+use super::capacity::{Capacity, PIXEL, WORD};
 use super::constants::{COUNTERS, DIGITS, Dispatch, GROUP, SCAN_BLOCK, SORT_BLOCK};
 use super::device::Gpu;
 use super::moments::MomentBuffers;
 use super::uniforms::FrameUniform;
-
-/// Capacity of the buffers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Capacity {
-    /// Number of blocks of Gaussians of the scene.
-    pub(super) blocks: u32,
-    /// Number of chunks of the scene.
-    pub(super) chunks: u32,
-    /// Number of Gaussians that may be visible.
-    pub(super) slots: u32,
-    /// Number of entries in the tile lists of a band.
-    pub(super) entries: u32,
-    /// Number of tiles of a band.
-    pub(super) tiles: u32,
-    /// Number of pixels of the picture.
-    pub(super) pixels: u64,
-}
 
 /// The buffers and their capacity.
 #[derive(Debug)]
@@ -56,15 +40,6 @@ pub(super) struct Work {
     /// Buffers for moments, which exist only while sensitivities are measured.
     pub(super) moments: Option<MomentBuffers>,
 }
-
-/// Number of bytes of a 32-bit word.
-pub(super) const WORD: u64 = 4;
-/// Number of bytes of a pixel: four floats.
-pub(super) const PIXEL: u64 = 16;
-/// Number of bytes of the largest element of arrays with one element for each slot: those of centres and conics.
-pub(super) const SLOT_ELEMENT: u64 = 16;
-/// Number of bytes of an element of arrays with one element for each entry.
-pub(super) const ENTRY_ELEMENT: u64 = WORD;
 
 impl Work {
     /// Makes the buffers. If `measuring` is set, makes buffers for moments too.

@@ -1,8 +1,6 @@
-//! The elements of charts: lines, areas and text. They are drawn as SVG for a page and as PDF for papers.
+//! The elements of charts: lines, areas and text. They are drawn as SVG for a page.
 
 use maud::{Markup, html};
-
-use super::pdf::pdf;
 
 /// The part of a text that is at the text's place: its start, its middle or its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,11 +46,6 @@ impl Figure {
                 @for shape in &self.shapes { (shape.svg()) }
             }
         }
-    }
-
-    /// Returns the figure as a PDF of one page.
-    pub(crate) fn pdf(&self) -> Vec<u8> {
-        pdf(&self.shapes)
     }
 }
 

@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::drawing::{Anchor, SIZE, Shape, number};
+use super::drawing::{Anchor, Figure, SIZE, Shape, number};
 
 /// Advance widths of Helvetica from the space to the tilde, in thousandths of the text size (Adobe, Core 14 AFM).
 const WIDTHS: [u16; 95] = [
@@ -17,8 +17,16 @@ const WIDTHS: [u16; 95] = [
 ];
 /// Width of all other letters. It is the width of a digit.
 const OTHER_WIDTH: u16 = 556;
+
+impl Figure {
+    /// Returns the figure as a PDF of one page.
+    pub(crate) fn pdf(&self) -> Vec<u8> {
+        pdf(&self.shapes)
+    }
+}
+
 /// Returns `shapes` as a PDF file. A pixel becomes a point. The same shapes give the same bytes.
-pub(super) fn pdf(shapes: &[Shape]) -> Vec<u8> {
+fn pdf(shapes: &[Shape]) -> Vec<u8> {
     let [width, height] = SIZE.map(number);
     // Pixels count from the top, and points from the bottom.
     let mut content = format!("1 0 0 -1 0 {height} cm 1 j\n");

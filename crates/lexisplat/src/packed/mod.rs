@@ -34,7 +34,9 @@ pub use decode::outline::{ChunkOutline, LayerOutline, Outline, RangeKind, RangeO
 #[cfg(feature = "encode")]
 pub use encode::appearance::{Appearance, AppearanceChange};
 #[cfg(feature = "encode")]
-pub use encode::pack::{PackOptions, Packer};
+pub use encode::options::PackOptions;
+#[cfg(feature = "encode")]
+pub use encode::pack::Packer;
 #[cfg(feature = "encode")]
 pub use encode::quantised::{Quantised, Refit};
 #[cfg(feature = "encode")]

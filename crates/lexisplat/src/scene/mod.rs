@@ -2,6 +2,7 @@
 
 pub(crate) mod extra;
 pub(crate) mod joined;
+pub(crate) mod moved;
 pub(crate) mod offset;
 pub(crate) mod rounding;
 pub(crate) mod sensitivity;

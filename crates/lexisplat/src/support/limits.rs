@@ -3,7 +3,6 @@
 use crate::scene::sh::MAX_REST;
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
-use crate::support::memory_budget::MemoryBudget;
 
 /// Most atoms a dictionary may have: indices fit in 10 bits, and the Gram matrix in 4 MiB.
 pub const MAX_ATOMS: usize = 1024;
@@ -138,15 +137,6 @@ impl Limits {
         let found = if found > MAX_REST as u64 { 0 } else { found };
         let what = format!("nonzeros of Gaussian {gaussian} in");
         raisable(&what, file, found, self.nonzeros, "nonzeros")
-    }
-
-    /// Refuses `count` Gaussians of `each` bytes in memory, made from a file of `file_bytes` bytes, if [`Self::bytes`] or
-    /// [`Self::expansion`] do not allow them. For readers of further formats.
-    ///
-    /// # Errors
-    /// [`Error::Limit`].
-    pub fn check_arrays(&self, file: &str, file_bytes: u64, count: usize, each: usize) -> Result<()> {
-        MemoryBudget::new(self, file, file_bytes).take(count, each)
     }
 
     /// Refuses a file of too many bytes that has to be held in memory.

@@ -58,6 +58,17 @@ impl<'a> MemoryBudget<'a> {
     }
 }
 
+impl Limits {
+    /// Refuses `count` Gaussians of `each` bytes in memory, made from a file of `file_bytes` bytes, if [`Self::bytes`] or
+    /// [`Self::expansion`] do not allow them. For readers of further formats.
+    ///
+    /// # Errors
+    /// [`Error::Limit`].
+    pub fn check_arrays(&self, file: &str, file_bytes: u64, count: usize, each: usize) -> Result<()> {
+        MemoryBudget::new(self, file, file_bytes).take(count, each)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -12,7 +12,7 @@ use lexisplat_compress::{ByteCount, RecordReport, part_bytes, sh_bytes};
 use lexisplat_eval::format;
 use serde::Serialize;
 
-use super::bars;
+use super::histogram::bars;
 use super::layers::LayersFacts;
 use crate::commands::compress::{error_line, record_line, removed_line};
 

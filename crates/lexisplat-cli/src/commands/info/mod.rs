@@ -1,6 +1,7 @@
 //! `lexisplat info`.
 
 mod codes;
+mod histogram;
 mod layers;
 
 use std::collections::BTreeMap;
@@ -17,12 +18,10 @@ use serde::Serialize;
 use serde_json::Value;
 
 use self::codes::LexiFacts;
+use self::histogram::bars;
 use crate::args::{Common, Info};
 use crate::files::{input, siblings, tell, warn};
 use crate::progress::Bars;
-
-/// Width of the longest bar of a histogram, in characters.
-const BAR: usize = 40;
 
 pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let (name, bytes) = input(&args.file, common)?;
@@ -206,15 +205,4 @@ impl<'a> Facts<'a> {
         }
         Ok(())
     }
-}
-
-/// Writes a bar for each label. Its length is in proportion to its count.
-fn bars(out: &mut String, labels: &[String], counts: &[u64]) -> Result<()> {
-    let most = counts.iter().copied().max().unwrap_or(0).max(1);
-    for (label, &count) in labels.iter().zip(counts) {
-        let length = (u128::from(count) * BAR as u128).div_ceil(u128::from(most));
-        let length = usize::try_from(length).unwrap_or(BAR);
-        writeln!(out, "  {label:>12} {:>10} {}", format::count(count), "#".repeat(length))?;
-    }
-    Ok(())
 }

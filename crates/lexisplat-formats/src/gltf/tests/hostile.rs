@@ -9,7 +9,7 @@ use super::super::read;
 use super::build::Builder;
 use super::opened;
 use crate::spz;
-use crate::write::WriteOptions;
+use crate::write_options::WriteOptions;
 
 const WORD: &str = "KHR_gaussian_splatting";
 

@@ -9,9 +9,9 @@ use super::super::write::{unit, write};
 use super::build::Builder;
 use super::{most, opened, read, sample};
 use crate::axes::Flip;
-use crate::edit::turned;
+use crate::quaternion::turned;
 use crate::spz;
-use crate::write::WriteOptions;
+use crate::write_options::WriteOptions;
 
 const WORD: &str = "KHR_gaussian_splatting";
 

@@ -5,7 +5,7 @@ use lexisplat::{Error, ShDegree};
 use super::super::write::{share, write};
 use super::{most, opened, read, sample};
 use crate::spz;
-use crate::write::WriteOptions;
+use crate::write_options::WriteOptions;
 
 #[test]
 fn floats_come_back_and_so_do_the_bytes() {

@@ -5,12 +5,13 @@
     reason = "tests: small numbers, and failing is their way to tell"
 )]
 
+use super::super::capacity::Capacity;
 use super::super::constants::{COUNTERS, GROUP, SCAN_BLOCK, SORT_BLOCK};
 use super::super::plan::dimensions;
 use super::super::shaders::{DRAWING, Kernels, kernels};
 use super::super::tests::{Random, gpu};
 use super::super::uniforms::FrameUniform;
-use super::super::work::{Capacity, Work};
+use super::super::work::Work;
 use super::*;
 
 /// The buffers for up to `slots` numbers, and what works on them.

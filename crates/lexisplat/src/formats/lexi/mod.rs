@@ -8,6 +8,7 @@
 mod checked;
 mod dictionary_file;
 mod exact;
+mod exact_tensors;
 mod extra_column;
 mod feed;
 mod fields;

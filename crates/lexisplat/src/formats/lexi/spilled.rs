@@ -1,11 +1,11 @@
 //! An exact file made part after part: its arrays are spilled until all sizes are known.
 
+use super::exact_tensors::{
+    ExactTensors, check_pointers, extra_tensor, geometry_tensors, paper_indices, paper_pointers, paper_values,
+};
 use super::layout::{CodeLayout, Layout};
 use super::schema::GEOMETRY;
 use super::tensors::Source;
-use super::write::{
-    ExactTensors, check_pointers, extra_tensor, geometry_tensors, paper_indices, paper_pointers, paper_values,
-};
 use crate::scene::source::SplatSource;
 use crate::scene::spilled::SpilledExtras;
 use crate::scene::splats::Geometry;

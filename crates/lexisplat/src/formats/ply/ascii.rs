@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
+use super::columns::ROWS_PER_TASK;
 use super::header::Header;
 use super::names::shown;
-use super::rows::ROWS_PER_TASK;
 use super::scalar::Scalar;
 use crate::scene::extra::{ScalarType, with_scalar};
 use crate::support::error::{Error, FormatError, Result};

@@ -4,12 +4,12 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use super::columns::Packed;
+use super::columns::{Packed, ROWS_PER_TASK};
 use super::file::PlyFile;
-use super::fill::{Found, empty};
+use super::fill::empty;
+use super::found::Found;
 use super::layout::REST;
-use super::read::{PlyRead, ReadOptions};
-use super::rows::ROWS_PER_TASK;
+use super::options::ReadOptions;
 use super::summary::PlySummary;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
@@ -31,6 +31,17 @@ pub struct PlySource<'a> {
     normals: bool,
     /// The scene, until it is taken, if it was read when the file was opened.
     whole: Mutex<Option<Splats>>,
+}
+
+/// A scene and a description of its file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlyRead {
+    /// The scene.
+    pub splats: Splats,
+    /// Oddities that did not prevent reading, one plain sentence each.
+    pub warnings: Vec<String>,
+    /// Description of the file.
+    pub summary: PlySummary,
 }
 
 impl<'a> PlySource<'a> {

@@ -1,12 +1,12 @@
 //! A PLY whose header was read and whose values were not.
 
-use super::fill::Found;
+use super::found::Found;
 use super::header::Header;
 use super::layout::{Layout, POSITIONS};
 use super::marks::marks;
 use super::names::NORMAL;
+use super::options::ReadOptions;
 use super::places::Places;
-use super::read::ReadOptions;
 use super::rows::Rows;
 use super::summary::PlySummary;
 use crate::formats::kind::without_byte_order_mark;

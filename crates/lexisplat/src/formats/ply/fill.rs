@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use super::columns::{Packed, any_not_finite, read_column};
+use super::columns::{Packed, ROWS_PER_TASK, any_not_finite, read_column};
 use super::file::PlyFile;
+use super::found::Found;
 use super::layout::{GROUPS, Layout, NORMALS, OPACITIES, POSITIONS, REST, SCALES, rest_name};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE};
 use super::places::Places;
-use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::{Extra, for_extra, with_scalar};
 use crate::scene::offset::single;
 use crate::scene::rounding;
@@ -68,35 +68,6 @@ struct Piece<'a> {
     /// Parts of the arrays of floats, in the order of [`Layout::groups`]. That of the normals is empty.
     floats: [&'a mut [f32]; GROUPS],
     extras: Vec<ExtraFill<'a>>,
-}
-
-/// What [`PlyFile::fill`] found.
-#[derive(Debug, Default)]
-pub(super) struct Found {
-    /// Rows with NaN or infinite values, ascending.
-    pub(super) bad: Vec<usize>,
-    /// The first such property of the first one, in INRIA's order.
-    pub(super) bad_property: Option<String>,
-    /// Whether any Gaussian whose values are all finite has a normal.
-    pub(super) normals: bool,
-    /// Number of infinite opacities.
-    pub(super) sure: usize,
-    /// What positions are like that are finer than f32, while the file is looked at.
-    pub(super) places: Places,
-    /// Number of Gaussians with a scale of minus infinity.
-    pub(super) flat: usize,
-}
-
-impl Found {
-    /// Adds what was found in the next rows.
-    pub(super) fn add(&mut self, next: Self) {
-        self.bad.extend(next.bad);
-        self.bad_property = self.bad_property.take().or(next.bad_property);
-        self.normals |= next.normals;
-        self.sure += next.sure;
-        self.places.add(next.places);
-        self.flat += next.flat;
-    }
 }
 
 impl PlyFile<'_> {

@@ -1,46 +1,12 @@
-//! Reads a PLY into a [`Splats`].
+//! Reads a PLY into a [`Splats`](crate::Splats).
 
 use std::path::Path;
 
-use super::chunks::PlySource;
-use super::summary::PlySummary;
-use crate::scene::splats::Splats;
-use crate::support::builder::builder_methods;
+use super::chunks::{PlyRead, PlySource};
+use super::options::ReadOptions;
 use crate::support::error::Result;
 use crate::support::input::Input;
-use crate::support::limits::Limits;
 use crate::support::progress::Silent;
-
-/// How to read a PLY.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct ReadOptions {
-    /// Whether to leave out Gaussians with NaN or infinite values instead of refusing the file. Default `false`.
-    pub drop_invalid: bool,
-    /// Whether to leave out the properties that 3DGS does not define. Default `false`.
-    pub drop_extras: bool,
-    /// How much a file may ask for.
-    pub limits: Limits,
-}
-
-impl ReadOptions {
-    builder_methods!(
-        with_drop_invalid(drop_invalid: bool),
-        with_drop_extras(drop_extras: bool),
-        with_limits(limits: Limits),
-    );
-}
-
-/// A scene and a description of its file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PlyRead {
-    /// The scene.
-    pub splats: Splats,
-    /// Oddities that did not prevent reading, one plain sentence each.
-    pub warnings: Vec<String>,
-    /// Description of the file.
-    pub summary: PlySummary,
-}
 
 /// Reads the PLY at `path`. With the feature `mmap` the file is mapped.
 ///

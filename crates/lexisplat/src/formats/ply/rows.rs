@@ -12,10 +12,6 @@ use super::scalar::Scalar;
 use crate::scene::extra::with_scalar;
 use crate::support::error::{Error, FormatError, Result};
 
-/// Rows that one task copies, one run of columns after another. At 248 bytes a row they stay in a core's second-level
-/// cache meanwhile.
-pub(super) const ROWS_PER_TASK: usize = 1024;
-
 /// The vertex rows of a file.
 #[derive(Debug)]
 pub(super) enum Rows<'a> {

@@ -1,9 +1,9 @@
 //! Writes a [`Splats`] in INRIA's layout, which every viewer reads.
 
+use super::columns::ROWS_PER_TASK;
 use super::layout::rest_name;
 use super::marks::{ANTIALIASED, mark, marks};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
-use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::{ScalarType, for_extra};
 use crate::scene::offset::Offset;
 use crate::scene::source::SplatSource;

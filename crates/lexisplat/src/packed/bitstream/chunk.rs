@@ -1,16 +1,17 @@
 //! Coding of a chunk: its ranges are a base, refinements, parts of SH-rest and interim changes, all in the same lanes.
 
-use super::fill_in::{CHANGES, interim};
+use super::fill_in::interim;
 use super::geometry_syntax::{GeometrySyntax, Group};
 use super::integer_model::Steering;
+use super::parameters::CHANGES;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest, RestForm};
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
+use crate::packed::bitstream::drawn::{Drawn, Frame};
 use crate::packed::bitstream::stream::BitCounts;
-use crate::packed::decode::chunk_unpack::{Drawn, Frame};
+use crate::packed::entropy::lanes::{LANES, Lanes, has};
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::rans_encoder::SymbolRecorder;
-use crate::packed::entropy::symbols::{LANES, Lanes, has};
 use crate::packed::entropy::tables::Lookup;
 use crate::support::crc32;
 

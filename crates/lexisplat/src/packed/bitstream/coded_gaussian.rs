@@ -1,7 +1,6 @@
 //! The values of a Gaussian that the encoder codes.
 
-use crate::packed::bitstream::fill_in::CHANGES;
-use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::bitstream::parameters::{CHANGES, TARGETS};
 use crate::packed::bitstream::values::{across, main_axis};
 use crate::support::maths::{Vec3, atan2, dot, square_of_axis};
 

@@ -3,15 +3,13 @@
 //! The Gaussians of the first layer lie apart. Until the next layer fills the space between them, they are drawn larger,
 //! more or less opaque, and in the colour of the Gaussians that are missing around them.
 
-use super::geometry_syntax::{DC, Group, OPACITY};
+use super::geometry_syntax::Group;
+use super::parameters::{DC, OPACITY};
 use super::streams::Stream;
-use crate::packed::bitstream::parameters::TARGETS;
-use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
+use crate::packed::bitstream::parameters::{CHANGES, KINDS, TARGETS};
+use crate::packed::entropy::lanes::{LANES, Lanes, each};
+use crate::packed::entropy::symbols::Symbols;
 
-/// Number of values with a change: one for all three scales, the opacity, and the coordinates of the base colour.
-pub(in crate::packed) const CHANGES: usize = 5;
-/// Number of kinds of changes, each with a step of its own: of scales, of opacities and of base colours.
-pub(in crate::packed) const KINDS: usize = 3;
 /// Largest step of a change. The limits of values are less than two of these steps apart.
 pub(in crate::packed) const MOST_STEP: u32 = 1 << 26;
 /// Number of classes that share a context, and number of such groups of classes.

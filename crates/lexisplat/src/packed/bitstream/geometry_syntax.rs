@@ -3,15 +3,16 @@
 //! Every value is coded as its difference from a prediction, in units of a step. The prediction and the step depend only on
 //! coarse integers that come earlier in the same range. So refinements may be missing.
 
-use super::fill_in::CHANGES;
 use super::integer_model::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
+use super::levels::{dropped, factor};
 use super::neighbour_context::{AVERAGED, NeighbourContext};
 use super::streams::Stream;
 use super::values::{MAX_LOG_OPACITY, rotations};
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::morton;
-use crate::packed::bitstream::parameters::{LAST_CLASS, TARGETS};
-use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
+use crate::packed::bitstream::parameters::{CHANGES, DC, LAST_CLASS, OPACITY, TARGETS};
+use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
+use crate::packed::entropy::symbols::Symbols;
 
 /// The stream of each predicted value.
 const TARGET_STREAMS: [Stream; TARGETS] =
@@ -19,26 +20,11 @@ const TARGET_STREAMS: [Stream; TARGETS] =
 const POSITION_STREAMS: [Stream; 3] = [Stream::Position0, Stream::Position1, Stream::Position2];
 /// Number of bits of a gap from which on all gaps share a context.
 const GAP_CONTEXTS: u32 = 23;
-/// Indices of the opacity and of the first coordinate of the base colour among the targets.
-pub(in crate::packed) const OPACITY: usize = 3;
-pub(in crate::packed) const DC: usize = 4;
 /// Indices of the averages that are not predicted: of the colour class, and of the shape class minus the colour class.
 const COLOUR: usize = TARGETS;
 const SHAPE: usize = TARGETS + 1;
-/// Largest number of refinements.
-pub(in crate::packed) const MAX_LEVELS: usize = 2;
-/// Number of bits that codes of rotations lack, by the number of missing refinements.
-pub(in crate::packed) const DROPPED: [u32; MAX_LEVELS + 1] = [0, 2, 3];
 /// Number of values that refinements apply to: the targets and three moves. Scales and opacities are always coded in full.
 pub(in crate::packed) const REFINED: usize = TARGETS + 3;
-/// Ratio of steps before and after one refinement.
-pub(in crate::packed) const FACTOR: i32 = 3;
-
-/// Returns the ratio of coarse steps to the finest ones, if `levels` refinements are missing.
-pub(in crate::packed) fn factor(levels: usize) -> i32 {
-    FACTOR.pow(levels as u32)
-}
-
 /// One Gaussian of each lane, as integers.
 #[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct Group {
@@ -229,13 +215,6 @@ impl<'a> GeometrySyntax<'a> {
                 s.signed(stream.at(self.levels), group.fineness[k], set, |l| coarsened(wanted[l], coarse));
         }
     }
-}
-
-/// Returns the number of bits that a code of `bits` bits lacks, if `levels` refinements are missing. At least one bit
-/// stays, so that every Gaussian takes bits.
-#[inline(always)]
-pub(in crate::packed) fn dropped(bits: u32, levels: usize) -> u32 {
-    DROPPED[levels].min(bits.saturating_sub(1))
 }
 
 /// Codes the colour class and the shape class.

@@ -5,15 +5,16 @@ use super::atoms::WholeAtoms;
 use super::axes::{axes_of, turn_of};
 use super::bytes::{ByteReader, put_number, put_short};
 use super::chunk::Form;
-use super::fill_in::{KINDS, MOST_STEP};
+use super::fill_in::MOST_STEP;
 use super::index::Index;
 use super::integer_model::{Integers, Steering, Step, VALUE_BITS};
 use super::mean_view::{MAX_POINTS, MeanView};
+use super::parameters::KINDS;
 use super::sh_codes::RestForm;
 use super::streams::REST_PARTS;
 use crate::packed::bitstream::bits::{BitReader, BitWriter};
+use crate::packed::bitstream::drawn::Frame;
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters};
-use crate::packed::decode::chunk_unpack::Frame;
 use crate::support::limits::MAX_ATOMS;
 
 /// Largest binary logarithm of the unit of base colours.

@@ -2,7 +2,7 @@
 
 use super::bytes::{ByteReader, put_number, put_short};
 use super::chunk::LayerForm;
-use super::geometry_syntax::MAX_LEVELS;
+use super::levels::MAX_LEVELS;
 
 /// Most layers of a file.
 const MAX_LAYERS: usize = 8;

@@ -5,7 +5,7 @@
 
 use crate::packed::bitstream::bits::{BitReader, BitWriter};
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, TARGETS};
-use crate::packed::entropy::symbols::{LANES, Lanes, each};
+use crate::packed::entropy::lanes::{LANES, Lanes, each};
 
 /// Fraction bits of values. Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
 pub(in crate::packed) const VALUE_BITS: u32 = 20;

@@ -6,8 +6,8 @@
 
 use super::bytes::shortened;
 use super::halves::doubled;
-use crate::packed::decode::chunk_unpack::Nonzero;
-use crate::packed::entropy::symbols::{LANES, Lanes};
+use crate::packed::bitstream::sh_codes::Nonzero;
+use crate::packed::entropy::lanes::{LANES, Lanes};
 use crate::scene::sh::{C0, CHANNELS, MAX_COEFFICIENTS, ShDegree, rest_basis};
 use crate::scene::splats::Splats;
 use crate::sparse::dictionary::Dictionary;

@@ -1,8 +1,8 @@
 //! Averages of the Gaussians that each lane coded last.
 
 use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::entropy::lanes::{LANES, Lanes, each};
 use crate::packed::entropy::shifts::{power, right};
-use crate::packed::entropy::symbols::{LANES, Lanes, each};
 
 /// Number of Gaussians that are remembered. More gain little, since neighbours on the Morton curve are neighbours in space.
 const WINDOW: usize = 16;

@@ -7,6 +7,13 @@ use crate::support::maths::{Vec3, exp2};
 /// Number of values of a Gaussian that are predicted from its neighbours and from its own earlier values: three scales, the
 /// opacity, and three coordinates of the base colour.
 pub(in crate::packed) const TARGETS: usize = 7;
+/// Indices of the opacity and of the first coordinate of the base colour among the targets.
+pub(in crate::packed) const OPACITY: usize = 3;
+pub(in crate::packed) const DC: usize = 4;
+/// Number of values with an interim change: one for all three scales, the opacity, and the coordinates of the base colour.
+pub(in crate::packed) const CHANGES: usize = 5;
+/// Number of kinds of interim changes, each with a step of its own: of scales, of opacities and of base colours.
+pub(in crate::packed) const KINDS: usize = 3;
 /// Number of features of a prediction: 1, the average of the same value over neighbours, the two classes, and three scales,
 /// as far as they are known.
 pub(in crate::packed) const FEATURES: usize = 7;

@@ -1,10 +1,13 @@
 //! Refinements: each coarse step becomes one of three finer steps, and rotations get more of their low bits.
 
-use super::geometry_syntax::{DC, FACTOR, Group, REFINED, coarsened, dropped, factor};
+use super::geometry_syntax::{Group, REFINED, coarsened};
+use super::levels::{FACTOR, dropped, factor};
+use super::parameters::DC;
 use super::streams::Stream;
 use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::entropy::lanes::{LANES, Lanes, each};
 use crate::packed::entropy::shifts::power;
-use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
+use crate::packed::entropy::symbols::Symbols;
 
 /// Number of contexts by the number of coarse steps: none, one, more.
 const BY_COUNT: u32 = 3;
@@ -69,10 +72,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::packed::entropy::lanes::has;
     use crate::packed::entropy::rans_decoder::SymbolDecoder;
     use crate::packed::entropy::rans_encoder::SymbolRecorder;
     use crate::packed::entropy::script::tables_of;
-    use crate::packed::entropy::symbols::has;
     use crate::packed::entropy::tables::Lookup;
 
     fn of<const N: usize, T: Copy>(values: &[T], first: usize) -> [Lanes<T>; N] {
@@ -131,7 +134,7 @@ mod tests {
             wanted in prop::collection::vec(prop_oneof![-20..20_i32, -1_000_000_000..=1_000_000_000], 20),
             codes in prop::collection::vec(any::<u32>(), 30),
             set in 1_u32..1 << LANES,
-            levels in 1..=crate::packed::bitstream::geometry_syntax::MAX_LEVELS,
+            levels in 1..=crate::packed::bitstream::levels::MAX_LEVELS,
         ) {
             let blank = group(levels, &wanted, &codes);
             let (mut recorder, mut coded) = (SymbolRecorder::default(), blank.clone());

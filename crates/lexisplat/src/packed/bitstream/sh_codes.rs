@@ -1,8 +1,11 @@
 //! Coding of SH-rest: the nonzeros of codes, in parts by their size, and exact rows.
 
+use half::f16;
+
 use super::streams::{REST_PARTS, Stream};
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
-use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
+use crate::packed::entropy::lanes::{LANES, Lanes, each};
+use crate::packed::entropy::symbols::Symbols;
 
 /// Number of colour classes with contexts of their own for numbers of nonzeros.
 const COUNT_CLASSES: u32 = 12;
@@ -25,6 +28,13 @@ const SIGNS: usize = 16;
 const LATER: u8 = u8::MAX;
 /// Upper bound of the sizes of nonzeros, which are smaller.
 const MAX_SIZE: u32 = 1 << 30;
+
+/// A nonzero of a code.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::packed) struct Nonzero {
+    pub(in crate::packed) atom: u16,
+    pub(in crate::packed) value: f16,
+}
 
 /// The parameters with which SH-rest is coded.
 #[derive(Debug, Clone, Default, PartialEq)]

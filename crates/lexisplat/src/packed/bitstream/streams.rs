@@ -1,6 +1,6 @@
 //! The streams of symbols. A stream has contexts, and a context has a table of probabilities.
 
-use super::geometry_syntax::MAX_LEVELS;
+use super::levels::MAX_LEVELS;
 
 /// Number of contexts of a stream.
 pub(in crate::packed) const CONTEXTS: usize = 24;

@@ -6,16 +6,18 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use super::chunk::{LayerForm, starts};
-use super::fill_in::{CHANGES, interim};
+use super::fill_in::interim;
 use super::geometry_syntax::{GeometrySyntax, Group};
+use super::parameters::CHANGES;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest};
 use super::streams::{Slot, Stream};
 use super::{Head, lanes};
 use crate::lexi::LexiReader;
+use crate::packed::entropy::lanes::{LANES, Lanes, has};
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::rans_encoder::MOST_BITS;
-use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, has, low_bits};
+use crate::packed::entropy::symbols::{Symbols, low_bits};
 use crate::packed::entropy::tables::{Lookup, Tables};
 use crate::support::limits::Limits;
 

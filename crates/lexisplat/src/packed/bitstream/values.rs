@@ -5,7 +5,7 @@
 //! in other ways: docs/FORMAT.md says how far values may differ.
 
 use super::integer_model::VALUE_BITS;
-use crate::packed::entropy::symbols::{LANES, Lanes, each};
+use crate::packed::entropy::lanes::{LANES, Lanes, each};
 
 /// The value of the integer 1.
 const UNIT: f32 = 1.0 / (1_u32 << VALUE_BITS) as f32;

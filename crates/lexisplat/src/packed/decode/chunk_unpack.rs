@@ -1,52 +1,23 @@
 //! Decoding of a chunk to the values that are drawn.
 
-#![expect(clippy::cast_possible_truncation, reason = "values are within limits that are checked or clamped")]
-#![expect(
-    clippy::needless_range_loop,
-    reason = "loops over lanes are written out, since iterators over several arrays do not become vector code"
-)]
-
 use std::ops::Range;
 
 use half::f16;
 
 use crate::packed::bitstream::chunk::{Form, LayerForm, Sink, Want, starts};
-use crate::packed::bitstream::fill_in::{KINDS, change};
-use crate::packed::bitstream::geometry_syntax::{DC, Group, OPACITY, dropped, factor};
+use crate::packed::bitstream::drawn::{Drawn, Frame};
+use crate::packed::bitstream::geometry_syntax::Group;
 use crate::packed::bitstream::halves::halved;
-use crate::packed::bitstream::integer_model::VALUE_BITS;
 use crate::packed::bitstream::mean_view::{MOST, MeanView, SeenAtoms, seen_row};
-use crate::packed::bitstream::parameters::{LAST_CLASS, TARGETS};
-use crate::packed::bitstream::sh_codes::{BLOCK, Coded, Cursor, Rest};
-use crate::packed::bitstream::values::{logits, numbers, powers, rotations};
+use crate::packed::bitstream::parameters::LAST_CLASS;
+use crate::packed::bitstream::sh_codes::{BLOCK, Coded, Cursor, Nonzero, Rest};
 use crate::packed::decode::place::{Piece, Place, indices};
-use crate::packed::entropy::symbols::{LANES, Lanes, each, has};
+use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
 use crate::packed::entropy::tables::Lookup;
 use crate::sparse::codes::Escapes;
 use crate::sparse::dictionary::Dictionary;
-use crate::support::maths::Vec3;
 use crate::support::memory_budget::MemoryBudget;
 use crate::support::simd::Simd;
-
-/// Bound of the absolute values of decoded values. All values that encoders accept are below it, even with the largest
-/// steps.
-const VALUE_LIMIT: i32 = 1 << (VALUE_BITS + 7);
-
-/// The parameters with which integers become values.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::packed) struct Frame {
-    /// Corner of the grid, and side of a cell, in world units.
-    pub(in crate::packed) origin: Vec3,
-    pub(in crate::packed) cell: f32,
-    /// Mean base colour, the axes along which differences from it are coded, and the unit of these coordinates.
-    pub(in crate::packed) dc_mean: Vec3,
-    pub(in crate::packed) dc_axes: [Vec3; 3],
-    pub(in crate::packed) dc_unit: f32,
-    /// Steps of the interim changes of scales, opacities and base colours; 0 if there are none.
-    pub(in crate::packed) interim: [u32; KINDS],
-    /// Steps of SH values, by colour class.
-    pub(in crate::packed) value_steps: [f32; LAST_CLASS as usize + 1],
-}
 
 /// Everything that is needed to decode the chunks of a file.
 #[derive(Debug)]
@@ -153,13 +124,6 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             Err(Refusal::Damaged)
         }
     }
-}
-
-/// A nonzero of a code.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::packed) struct Nonzero {
-    pub(in crate::packed) atom: u16,
-    pub(in crate::packed) value: f16,
 }
 
 /// The output of a decoded chunk.
@@ -288,98 +252,5 @@ impl Sink for Out<'_, '_> {
             }
         }
         Some(())
-    }
-}
-
-/// One Gaussian of each lane, as the values that are drawn.
-pub(in crate::packed) struct Drawn {
-    pub(in crate::packed) position: [Lanes<f32>; 3],
-    scales: [Lanes<f32>; 3],
-    opacity: Lanes<f32>,
-    rotation: [Lanes<f32>; 4],
-    dc: [Lanes<f32>; 3],
-    /// Whether all values of a lane are within [`VALUE_LIMIT`].
-    within: Lanes<bool>,
-}
-
-impl Drawn {
-    #[cfg_attr(target_arch = "wasm32", inline(never))]
-    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub(in crate::packed) fn new(
-        frame: &Frame,
-        group: &Group,
-        [levels, missing]: [usize; 2],
-        alone: &Lanes<bool>,
-    ) -> Self {
-        let (coarse, finer) = (factor(levels), factor(missing));
-        let mut values = group.coarse;
-        // Scales and opacities have no coarse steps.
-        for t in DC..TARGETS {
-            for l in 0..LANES {
-                let over = group.counts[t][l]
-                    .wrapping_mul(finer)
-                    .wrapping_sub(group.base[t][l].wrapping_mul(coarse));
-                values[t][l] = values[t][l].wrapping_add(over.wrapping_mul(group.steps[t][l]));
-            }
-        }
-        if alone.iter().any(|&alone| alone) {
-            change(&mut values, &group.interim, &frame.interim, alone);
-        }
-        // The limit is a power of two. If a number is within it, `number ^ sign` has no bits at or above it.
-        let mut beyond = [0; LANES];
-        for values in &values {
-            for l in 0..LANES {
-                beyond[l] |= values[l] ^ values[l] >> 31;
-            }
-        }
-        let within = each(|l| beyond[l] < VALUE_LIMIT);
-        let [directions, turns] = &group.axis_bits;
-        let left = |bits: &Lanes<u32>| each(|l| bits[l] - dropped(bits[l], missing));
-        let bits = [left(directions), left(turns)];
-        let turned = rotations(&group.rotation, &bits, &group.needle);
-        let centre = |k: usize| {
-            let origin = f64::from(frame.origin[k]);
-            each(|l| origin + (f64::from(group.cell[k][l]) + 0.5) * f64::from(frame.cell))
-        };
-        let mut position: [Lanes<f64>; 3] = [centre(0), centre(1), centre(2)];
-        for k in 0..3 {
-            let step = powers(&group.moves[k]);
-            for j in 0..3 {
-                for l in 0..LANES {
-                    let along = f64::from(group.counts[TARGETS + k][l].wrapping_mul(finer)) * step[l];
-                    position[j][l] += along * f64::from(turned.axes[k][j][l]);
-                }
-            }
-        }
-        let coordinates = [numbers(&values[DC]), numbers(&values[DC + 1]), numbers(&values[DC + 2])];
-        let channel = |c: usize| {
-            let [a, b, d] = frame.dc_axes.map(|axis| axis[c] * frame.dc_unit);
-            each(|l| frame.dc_mean[c] + coordinates[0][l] * a + coordinates[1][l] * b + coordinates[2][l] * d)
-        };
-        Self {
-            position: [
-                each(|l| position[0][l] as f32),
-                each(|l| position[1][l] as f32),
-                each(|l| position[2][l] as f32),
-            ],
-            scales: [numbers(&values[0]), numbers(&values[1]), numbers(&values[2])],
-            opacity: logits(&values[OPACITY]),
-            rotation: turned.quaternions,
-            dc: [channel(0), channel(1), channel(2)],
-            within,
-        }
-    }
-
-    /// Returns whether the values of all lanes in `set` are within limits and finite.
-    #[inline(always)]
-    pub(in crate::packed) fn can_be(&self, set: u32) -> bool {
-        let all = self.position.iter().chain(&self.dc);
-        let mut good = self.within;
-        for values in all {
-            for l in 0..LANES {
-                good[l] &= values[l].is_finite();
-            }
-        }
-        (0..LANES).all(|l| good[l] || !has(set, l))
     }
 }

@@ -4,17 +4,14 @@
 //! (docs/METHOD.md, "Layers"). Fitting to pictures may change its opacity in another way, change its colour, and add to its
 //! growth.
 
-use super::appearance::AppearanceChange;
+use super::appearance::{AppearanceChange, STEPS, steps};
+use crate::packed::bitstream::CHANGES;
 use crate::packed::bitstream::parameters::Parameters;
-use crate::packed::bitstream::{CHANGES, KINDS};
 use crate::packed::curve::MortonKey;
 use crate::scene::splats::Geometry;
 use crate::support::maths::log_sigmoid;
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
-/// Steps of the interim changes: of the natural logarithm of scales, of that of the opacity, and of SH coefficients of the
-/// base colour.
-pub(in crate::packed) const STEPS: [f64; KINDS] = [0.4, 0.5, 0.6];
 /// Most steps by which scales grow without pictures.
 const MOST_GROWTH: f64 = 2.0;
 /// The natural logarithms of scales grow by `GROWTH * ln(1 + MISSING * x) + RARE * ln(p)`. `x` is the opacity times area of
@@ -25,8 +22,6 @@ const MISSING: f64 = 0.3;
 const RARE: f64 = -0.15;
 /// The natural logarithm of the opacity grows by `OPACITY * ln(1 + x)`, with the `x` of [`GROWTH`].
 const OPACITY: f64 = 0.3;
-/// Largest absolute number of steps of a change.
-const MOST_STEPS: f64 = 1000.0;
 /// Number of Gaussians on each side along the Morton curve among which the nearest one is searched for.
 const NEIGHBOURS: usize = 16;
 
@@ -88,12 +83,6 @@ impl Alone {
         let grows = growth + steps(f64::from(*log_scale), STEPS[0]);
         [grows, steps(f64::from(*log_opacity), STEPS[1]), a, b, c]
     }
-}
-
-/// Returns `x / step`, rounded to the nearest number of steps.
-#[expect(clippy::cast_possible_truncation, reason = "clamped")]
-pub(in crate::packed) fn steps(x: f64, step: f64) -> i32 {
-    libm::rint(x / step).clamp(-MOST_STEPS, MOST_STEPS) as i32
 }
 
 /// Returns the ratio `sum / own` for each Gaussian before `first`. `own` is its opacity times its area. `sum` is the

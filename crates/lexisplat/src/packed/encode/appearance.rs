@@ -1,13 +1,18 @@
 //! What a Gaussian shows, apart from its shape and its view-dependent colour.
 
-use super::alone::{STEPS, steps};
 use super::canonical::MIN_LOG_OPACITY;
+use crate::packed::bitstream::KINDS;
 use crate::scene::splats::{Geometry, all_finite};
 use crate::support::error::{Error, Result};
 use crate::support::maths::{log_sigmoid, logit_of_log};
 
 /// Largest logarithm of an opacity. Its exponential, 0.9999, counts as opaque.
 const MAX_LOG_OPACITY: f32 = -1e-4;
+/// Steps of the interim changes: of the natural logarithm of scales, of that of the opacity, and of SH coefficients of the
+/// base colour.
+pub(in crate::packed) const STEPS: [f64; KINDS] = [0.4, 0.5, 0.6];
+/// Largest absolute number of steps of a change.
+const MOST_STEPS: f64 = 1000.0;
 
 /// The base colour and the opacity of a Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +65,12 @@ impl AppearanceChange {
             ("changes of scales", scale),
         ])
     }
+}
+
+/// Returns `x / step`, rounded to the nearest number of steps.
+#[expect(clippy::cast_possible_truncation, reason = "clamped")]
+pub(in crate::packed) fn steps(x: f64, step: f64) -> i32 {
+    libm::rint(x / step).clamp(-MOST_STEPS, MOST_STEPS) as i32
 }
 
 impl Appearance {

@@ -1,9 +1,8 @@
 //! The canonical form of a scene: one of the 24 descriptions of each ellipsoid, and what is coded of it.
 
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
-use crate::packed::bitstream::fill_in::CHANGES;
 use crate::packed::bitstream::integer_model::VALUE_BITS;
-use crate::packed::bitstream::parameters::Parameters;
+use crate::packed::bitstream::parameters::{CHANGES, Parameters};
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, columns, cross, dot, log_sigmoid, longest_first};
 

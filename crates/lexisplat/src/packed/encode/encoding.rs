@@ -3,10 +3,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::alone;
+use super::appearance::STEPS;
 use super::coder::ChunkCoder;
 use super::layering::Layering;
-use super::pack::PackOptions;
+use super::options::PackOptions;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::bitstream::{
     Chunk, CodedChunk, Form, Head, Index, LayerForm, Place, Range, Stream, WholeAtoms, lanes, stream_of,
@@ -152,7 +152,7 @@ impl Encoding {
         let mean_view = coder.mean_view.clone();
         let mut head = Head::new(&coder.parameters, most_dc, rest, &atoms, mean_view);
         if layering.layers() > 1 {
-            head = head.with_interim(alone::STEPS);
+            head = head.with_interim(STEPS);
         }
         counts.raw_bits.0[Stream::Dictionary as usize] = 8.0 * head.dictionary.len() as f64;
         let form = head.form();

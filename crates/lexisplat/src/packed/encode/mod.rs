@@ -11,6 +11,7 @@ pub(in crate::packed) mod floor;
 pub(in crate::packed) mod layering;
 pub(in crate::packed) mod neighbours;
 pub(in crate::packed) mod octaves;
+pub(in crate::packed) mod options;
 pub(in crate::packed) mod pack;
 pub(in crate::packed) mod quantised;
 pub(in crate::packed) mod removal;

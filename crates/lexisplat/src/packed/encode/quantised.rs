@@ -8,7 +8,7 @@ use super::codebook::Codes;
 use super::coder::{ChunkCoder, OrderedGaussians, too_large};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written};
 use super::layering::Layering;
-use super::pack::PackOptions;
+use super::options::PackOptions;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::bitstream::{CodedChunk, MeanView};

@@ -1,14 +1,16 @@
 //! Recoding of the ranges of a chunk with other tables.
 
 use crate::packed::bitstream::chunk::{Form, LayerForm, lanes, sets};
-use crate::packed::bitstream::fill_in::{CHANGES, interim};
+use crate::packed::bitstream::fill_in::interim;
 use crate::packed::bitstream::geometry_syntax::{GeometrySyntax, Group};
+use crate::packed::bitstream::parameters::CHANGES;
 use crate::packed::bitstream::refinement::refine;
 use crate::packed::bitstream::sh_codes::{BLOCK, Rest};
 use crate::packed::bitstream::streams::Slot;
+use crate::packed::entropy::lanes::{LANES, Lanes};
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::rans_encoder::SymbolRecorder;
-use crate::packed::entropy::symbols::{LANES, Lanes, Symbols};
+use crate::packed::entropy::symbols::Symbols;
 use crate::packed::entropy::tables::Lookup;
 
 /// A decoder that records the symbols that it decodes.

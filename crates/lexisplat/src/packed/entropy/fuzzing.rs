@@ -3,10 +3,10 @@
 use crate::packed::Packed;
 use crate::packed::bitstream::head::Head;
 use crate::packed::bitstream::index::Place;
+use crate::packed::entropy::lanes::LANES;
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::rans_encoder::SymbolRecorder;
 use crate::packed::entropy::script::{Ask, ask, tables_of};
-use crate::packed::entropy::symbols::LANES;
 use crate::packed::entropy::tables::{Lookup, Tables};
 use crate::scene::sh::ShDegree;
 

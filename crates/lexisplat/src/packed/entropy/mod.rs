@@ -9,6 +9,7 @@
 pub(in crate::packed) mod adaptive_bits;
 #[cfg(feature = "fuzzing")]
 pub mod fuzzing;
+pub(in crate::packed) mod lanes;
 pub(in crate::packed) mod log_probabilities;
 pub(in crate::packed) mod rans_decoder;
 pub(in crate::packed) mod rans_encoder;

@@ -2,9 +2,10 @@
 
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::bitstream::streams::{CONTEXTS, Slot};
+use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
 use crate::packed::entropy::rans_encoder::{LEAST, MOST_BITS, length_bytes};
 use crate::packed::entropy::shifts::{power, right_unsigned};
-use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
+use crate::packed::entropy::symbols::Symbols;
 use crate::packed::entropy::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
 use crate::support::simd::Simd;
 

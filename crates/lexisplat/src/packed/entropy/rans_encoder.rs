@@ -3,7 +3,8 @@
 //! Raw bits pass through the same states as modelled symbols, so that a lane is one run of words that is read forward.
 
 use crate::packed::bitstream::streams::Slot;
-use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, has};
+use crate::packed::entropy::lanes::{LANES, Lanes, has};
+use crate::packed::entropy::symbols::Symbols;
 use crate::packed::entropy::tables::{Model, Tables};
 
 /// Least state between symbols. An encoder starts each lane with it, and a decoder ends with it.

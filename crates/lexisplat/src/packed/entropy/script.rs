@@ -1,8 +1,9 @@
 //! Scripts of values that are coded one after the other, for tests and fuzz targets of the entropy coder.
 
 use crate::packed::bitstream::streams::Slot;
+use crate::packed::entropy::lanes::{LANES, each};
 use crate::packed::entropy::rans_encoder::SymbolRecorder;
-use crate::packed::entropy::symbols::{LANES, Symbols, each};
+use crate::packed::entropy::symbols::Symbols;
 use crate::packed::entropy::tables::{ALL_CONTEXTS, Histogram, Tables};
 
 /// One entry of a script.

@@ -4,7 +4,7 @@
 //! a power of two is made as the exponent of a float, and a shift is a product with a power of two. Both ways give the same
 //! bits.
 
-use crate::packed::entropy::symbols::{Lanes, each};
+use crate::packed::entropy::lanes::{Lanes, each};
 
 /// Largest shift.
 pub(in crate::packed) const MOST_SHIFT: u32 = 16;
@@ -51,7 +51,7 @@ fn right_unsigned_by_product(numbers: &Lanes<u32>, n: &Lanes<u32>) -> Lanes<u32>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packed::entropy::symbols::LANES;
+    use crate::packed::entropy::lanes::LANES;
     use crate::support::rng::SplitMix64;
 
     #[test]

@@ -4,6 +4,7 @@
 //! however the process ends. Elsewhere an unfinished file is named `.lexisplat-*.part` and lies in the folder of
 //! the output. An error removes it, and so does [`OutputGroup::stop`].
 
+mod destination;
 mod group;
 mod place;
 mod temporary;
@@ -14,10 +15,12 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
+use self::destination::folder_of;
 use self::place::{Place, in_folder, place};
 use self::temporary::Temporary;
 use crate::support::error::{Error, Result};
 
+pub use self::destination::{Existing, Output};
 pub use self::group::OutputGroup;
 
 /// The part of a file's mode that says who may read, write and run it; not whose rights it runs with.
@@ -26,54 +29,7 @@ const PERMISSIONS: u32 = 0o777;
 /// Bytes of the write buffer.
 const BUFFER: usize = 1 << 20;
 
-/// What to do about a file that already exists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Existing {
-    /// The new file replaces it in one step.
-    #[default]
-    Replace,
-    /// The write fails with [`io::ErrorKind::AlreadyExists`], also if the file was made during the write.
-    Refuse,
-}
-
-/// Where to write a file. A path converts into an output that replaces an existing file.
-#[derive(Debug, Clone, Copy)]
-pub struct Output<'a> {
-    path: &'a Path,
-    existing: Existing,
-    bytes: Option<u64>,
-    group: Option<&'a OutputGroup>,
-}
-
-impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Output<'a> {
-    fn from(path: &'a P) -> Self {
-        Self::new(path, Existing::Replace)
-    }
-}
-
-impl<'a> Output<'a> {
-    /// The file `path`. If `path` is a link, the file that it points to is written, and the link stays.
-    pub fn new(path: &'a (impl AsRef<Path> + ?Sized), existing: Existing) -> Self {
-        Self { path: path.as_ref(), existing, bytes: None, group: None }
-    }
-
-    /// Makes the output a member of `group`, which can end it.
-    #[must_use]
-    pub fn within(self, group: &'a OutputGroup) -> Self {
-        Self { group: Some(group), ..self }
-    }
-
-    /// The path as the caller named it.
-    #[must_use]
-    pub fn path(&self) -> &'a Path {
-        self.path
-    }
-
-    /// Sets the size in bytes, which an error about a full disk then states.
-    pub(crate) fn of_bytes(self, bytes: u64) -> Self {
-        Self { bytes: Some(bytes), ..self }
-    }
-
+impl Output<'_> {
     /// Finds out, before any work is done, whether a file could be written here. Leaves no file behind.
     ///
     /// # Errors
@@ -110,14 +66,6 @@ impl<'a> Output<'a> {
             }
             (error, _) => error,
         }
-    }
-}
-
-/// The folder `path` is in.
-pub(crate) fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
     }
 }
 

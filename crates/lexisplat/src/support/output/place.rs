@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::{Existing, Output, folder_of};
+use super::destination::{Existing, Output, folder_of};
 use crate::support::error::{Error, Result};
 
 /// Most links followed in a row. Linux follows as many.

@@ -7,7 +7,8 @@ use std::path::Path;
 
 use tempfile::TempPath;
 
-use super::{Existing, OutputGroup};
+use super::destination::Existing;
+use super::group::OutputGroup;
 
 /// A file that is being written. Dropping it removes the file.
 #[derive(Debug)]
@@ -63,7 +64,7 @@ impl Temporary {
 
     #[cfg(target_os = "linux")]
     fn name_unnamed(self, mut file: File, target: &Path, existing: Existing) -> io::Result<()> {
-        use super::folder_of;
+        use super::destination::folder_of;
         use super::unnamed::link;
         let linked = self.group.unless_stopped(|state| {
             match link(&file, target) {
@@ -103,7 +104,7 @@ impl Temporary {
 /// but cannot name them afterwards.
 #[cfg(target_os = "linux")]
 fn copy(file: &mut File, target: &Path, existing: Existing, group: &OutputGroup) -> io::Result<()> {
-    let (mut named, temporary) = Temporary::create_named(super::folder_of(target), group)?;
+    let (mut named, temporary) = Temporary::create_named(super::destination::folder_of(target), group)?;
     io::Seek::rewind(file)?;
     io::copy(file, &mut named)?;
     named.set_permissions(file.metadata()?.permissions())?;

@@ -1,6 +1,7 @@
 //! Reading a packed file from bytes as they come.
 
 mod elsewhere;
+mod options;
 mod ranges;
 mod run;
 
@@ -16,54 +17,14 @@ use crate::formats::kind::FileKind;
 use crate::packed::{Data, Decoder, Outline, PackedHead};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Model;
-use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 
+pub use self::options::FeedOptions;
+
 /// Bytes that are asked for first: the length of the header, and the first byte of it, by which a .lexi is known.
 const FIRST_BYTES: usize = LENGTH_BYTES + 1;
-
-/// What a [`LexiFeed`] asks for.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct FeedOptions {
-    /// Most bytes of the file that are held at once. Default no limit.
-    pub most_bytes: u64,
-    /// Parts of the nonzeros of SH-rest that are asked for, those of the largest values first. Default all; with 0 there is no
-    /// SH-rest.
-    pub sh_parts: usize,
-    /// Only chunks with centres of Gaussians in the box from the first of these points to the second are asked for. Default
-    /// all.
-    pub within: Option<[[f32; 3]; 2]>,
-    /// Of ranges of the same kind in the same layer, those of chunks near this point are asked for first. Default the order of
-    /// the file.
-    pub nearest: Option<[f32; 3]>,
-    /// Verify the checksums of the integers that ranges decode to, as those who write another decoder do. Default no.
-    pub verify_integers: bool,
-}
-
-impl Default for FeedOptions {
-    fn default() -> Self {
-        Self {
-            most_bytes: u64::MAX,
-            sh_parts: usize::MAX,
-            within: None,
-            nearest: None,
-            verify_integers: false,
-        }
-    }
-}
-
-impl FeedOptions {
-    builder_methods!(
-        with_most_bytes(most_bytes: u64),
-        with_sh_parts(sh_parts: usize),
-        with_within(within: impl Into<Option<[[f32; 3]; 2]>>),
-        with_nearest(nearest: impl Into<Option<[f32; 3]>>),
-        with_verify_integers(verify_integers: bool),
-    );
-}
 
 /// A reader of a packed .lexi file that is fed bytes as they come.
 ///

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::FeedOptions;
+use super::options::FeedOptions;
 use super::run::Run;
 use crate::packed::{AvailableRanges, Decoder, Outline, PackedHead, RangeKind, RangeOutline};
 use crate::support::crc32;

@@ -174,9 +174,7 @@ fn rows_that_are_not_finite_are_refused() {
         let mut scene = Scene::default();
         let mut exact = vec![1.0; 9];
         exact[8] = wild;
-        let mut target = CodedGaussian::default();
-        target.exact = exact;
-        scene[0].push(target);
+        scene[0].push(CodedGaussian { exact, ..CodedGaussian::default() });
         let mut parts = vec![SymbolRecorder::default(); 2];
         assert!(code(&mut parts, &form, &scene, true, |_, _| ()).is_none(), "{wild}");
     }

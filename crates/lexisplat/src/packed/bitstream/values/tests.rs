@@ -5,7 +5,6 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::encode::canonical::Canonical;
 

@@ -2,15 +2,12 @@
 
 use std::ops::Range;
 
-use super::look::{LookStatistics, Looked, SHOWN};
 use super::plan::{Piece, Plan};
 use crate::packed::curve::MortonKey;
 use crate::packed::decode::reorder::{gather, gather_geometry};
-use crate::packed::encode::pack::check;
-use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
-use crate::stream::{Observed, RowLayout};
+use crate::stream::RowLayout;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 
@@ -123,33 +120,5 @@ impl Bucket {
     #[must_use]
     pub fn splats(&self) -> &Splats {
         &self.splats
-    }
-
-    /// Sums up what was `observed` of the bucket's Gaussians. Without an observation, the sensitivity is guessed from each
-    /// Gaussian alone.
-    ///
-    /// # Errors
-    /// [`crate::Error::Parameter`] if the sensitivity has another length or values that are not finite, or if the step
-    /// factor is not a finite number above 0.
-    pub fn look(&self, plan: &Plan, observed: Option<Observed>) -> Result<(LookStatistics, Looked)> {
-        let (Observed { sensitivity, memo, .. }, scale) = match observed {
-            None => {
-                let total = plan.guessed_total / SHOWN;
-                (Sensitivity::guess_of_part(&self.splats.geometry, total).into(), 1.0)
-            }
-            Some(mut observed) => {
-                observed.check()?;
-                let share = self.splats.len() as f64 / plan.len().max(1) as f64;
-                // All parts have one overall step. A part that asks for half of that step gets four times the weights
-                // instead.
-                #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-                let scale = (share / observed.step_factor.powi(2)) as f32;
-                observed.sensitivity.scale(scale);
-                (observed, scale)
-            }
-        };
-        check(&self.splats, &sensitivity)?;
-        let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
-        Ok((statistics, looked.with_observer(scale, memo)))
     }
 }

@@ -8,8 +8,10 @@ use super::plan::Plan;
 use crate::packed::bitstream::MeanView;
 use crate::packed::encode::fit::{ColourMoments, Derivatives};
 use crate::packed::encode::octaves::{Histogram, Pairs};
+use crate::packed::encode::pack::check;
 use crate::packed::encode::removal::{changes_without, is_worth_its_bits};
 use crate::scene::sensitivity::Sensitivity;
+use crate::stream::Observed;
 use crate::support::error::{Error, Result};
 
 /// Sum of the squared weights that views measure. A guess scales its weights to a sum of 1, but the sum of squares is
@@ -47,6 +49,36 @@ pub struct LookStatistics {
 }
 
 messages!(Looked => "looked", LookStatistics => "look statistics");
+
+impl Bucket {
+    /// Sums up what was `observed` of the bucket's Gaussians. Without an observation, the sensitivity is guessed from each
+    /// Gaussian alone.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] if the sensitivity has another length or values that are not finite, or if the step
+    /// factor is not a finite number above 0.
+    pub fn look(&self, plan: &Plan, observed: Option<Observed>) -> Result<(LookStatistics, Looked)> {
+        let (Observed { sensitivity, memo, .. }, scale) = match observed {
+            None => {
+                let total = plan.guessed_total / SHOWN;
+                (Sensitivity::guess_of_part(&self.splats.geometry, total).into(), 1.0)
+            }
+            Some(mut observed) => {
+                observed.check()?;
+                let share = self.splats.len() as f64 / plan.len().max(1) as f64;
+                // All parts have one overall step. A part that asks for half of that step gets four times the weights
+                // instead.
+                #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
+                let scale = (share / observed.step_factor.powi(2)) as f32;
+                observed.sensitivity.scale(scale);
+                (observed, scale)
+            }
+        };
+        check(&self.splats, &sensitivity)?;
+        let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
+        Ok((statistics, looked.with_observer(scale, memo)))
+    }
+}
 
 impl LookStatistics {
     pub(super) fn of(bucket: &Bucket, found: &Sensitivity, plan: &Plan) -> (Self, Looked) {

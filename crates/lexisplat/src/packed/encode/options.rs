@@ -1,0 +1,83 @@
+//! Options of packing.
+
+use serde::{Deserialize, Serialize};
+
+use super::layering::LEAST_LAYERED;
+use crate::scene::splats::all_finite;
+use crate::support::builder::builder_methods;
+use crate::support::error::{Error, Result};
+use crate::support::limits::MAX_ATOMS;
+
+/// Options of packing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct PackOptions {
+    /// Un-squared L2 norm that the SH-rest error of no Gaussian exceeds. By default there is none, and SH are as exact as
+    /// pictures need.
+    pub tolerance: Option<f64>,
+    /// Number of atoms to learn, 1 to 1024. `None` lets the size of the scene decide.
+    pub atoms: Option<usize>,
+    /// Stores the place of each Gaussian in the source. Then no Gaussian is left out.
+    pub keep_order: bool,
+    /// Leaves no Gaussian out, and keeps base colours and opacities. A tolerance does so too.
+    pub keep_all: bool,
+    /// Seed of the learning sample.
+    pub seed: u64,
+    /// Up to 15 points from which the scene is seen. The file then holds the base colours that are seen from these points
+    /// on average, so that colours are right without SH-rest too.
+    pub viewpoints: Vec<[f32; 3]>,
+    /// Least number of Gaussians of a scene with two layers. The first layer draws the whole scene coarsely. Smaller scenes
+    /// have one layer. Default 8,000; `usize::MAX` for one layer always.
+    pub layers_from: usize,
+}
+
+impl Default for PackOptions {
+    fn default() -> Self {
+        Self {
+            tolerance: None,
+            atoms: None,
+            keep_order: false,
+            keep_all: false,
+            seed: 0,
+            viewpoints: Vec::new(),
+            layers_from: LEAST_LAYERED,
+        }
+    }
+}
+
+impl PackOptions {
+    builder_methods!(
+        with_tolerance(tolerance: impl Into<Option<f64>>),
+        with_atoms(atoms: impl Into<Option<usize>>),
+        with_keep_order(keep_order: bool),
+        with_keep_all(keep_all: bool),
+        with_seed(seed: u64),
+        with_viewpoints(viewpoints: Vec<[f32; 3]>),
+        with_layers_from(layers_from: usize),
+    );
+
+    /// Returns whether packing may leave Gaussians out, and may change base colours and opacities to make up for errors.
+    #[must_use]
+    pub fn may_change(&self) -> bool {
+        !self.keep_all && !self.keep_order && self.tolerance.is_none()
+    }
+
+    /// Refuses options out of range.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names the option.
+    pub fn check(&self) -> Result<()> {
+        if let Some(atoms) = self.atoms
+            && !(1..=MAX_ATOMS).contains(&atoms)
+        {
+            return Err(Error::parameter("atoms", atoms, format!("1 to {MAX_ATOMS}")));
+        }
+        all_finite([("viewpoints", self.viewpoints.as_flattened())])?;
+        if let Some(tol) = self.tolerance
+            && (!tol.is_finite() || tol <= 0.0)
+        {
+            return Err(Error::parameter("tolerance", tol, "a finite number above 0"));
+        }
+        Ok(())
+    }
+}
