@@ -248,4 +248,23 @@ mod tests {
         let Found { best, judges } = found(&splats, [10, 6]);
         assert!(best.len() + judges.len() > 0);
     }
+
+    #[test]
+    fn evenly_spread_views_show_a_few_gaussians_far_from_all_others() {
+        let mut splats = scene(&SampleOptions::new(1350, 3));
+        let mut few = scene(&SampleOptions::new(150, 4));
+        let place = [1000.0, 0.0, 0.0];
+        for position in &mut few.geometry.positions {
+            *position = std::array::from_fn(|k| position[k] + place[k]);
+        }
+        splats.append(few);
+        let splats = splats.gathered(&curve_order(&splats.geometry));
+        // The one view in ten that is of them looks at their middle, from no farther than they are from the others.
+        let shows = |camera: &&Camera| {
+            let [x, y, z] = camera.to_view(place);
+            z > 0.0 && z < 500.0 && x.hypot(y) < z
+        };
+        let count = evenly(&splats, 40).iter().filter(shows).count();
+        assert!((2..8).contains(&count), "{count}");
+    }
 }
