@@ -48,7 +48,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Returns rows `range` packed, and whether they are big-endian. In an ASCII file this is fastest if the range
-    /// starts at a multiple of [`ROWS_PER_TASK`].
+    /// starts at a multiple of [`ROWS_PER_TASK`](super::columns::ROWS_PER_TASK).
     pub(super) fn packed(&self, range: Range<usize>) -> Result<(Cow<'_, [u8]>, bool)> {
         match self {
             Self::Binary(rows) => {

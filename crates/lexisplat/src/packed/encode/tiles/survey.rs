@@ -77,7 +77,7 @@ impl Survey {
     /// `before`.
     ///
     /// # Errors
-    /// [`Error::Format`] that names the tile.
+    /// [`crate::Error::Format`] that names the tile.
     pub fn check(&self, name: &str, before: Option<&Self>) -> Result<()> {
         self.kind.check(name, before.map(|before| &before.kind), self.gaussians)
     }
