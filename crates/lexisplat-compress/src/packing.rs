@@ -20,7 +20,7 @@ const MEMORY_PER_TEN_BYTES: u64 = 26;
 /// Default of the program and of the Python package for the memory that packing a whole scene may take, in bytes.
 pub const DEFAULT_MEMORY: u64 = 4 << 30;
 /// Largest number of Gaussians of a scene without cameras that is packed whole. The views of a larger scene show each Gaussian too
-/// seldom. Relative to whole scenes at equal quality, files in parts are 4 % larger for 0.4 million Gaussians and 25 % smaller for
+/// seldom. Relative to whole scenes at equal quality, files in parts are 4 % larger for 0.4 million Gaussians and 27 % smaller for
 /// 1.2 million (docs/results/sizes.md).
 const MOST_WHOLE: u64 = 786_432;
 
