@@ -132,8 +132,11 @@ struct Seen {
 pub(crate) fn evenly(splats: &Splats, count: usize) -> Vec<Camera> {
     let views = natural_views(&splats.geometry, CHOICE * count, GENERATED_SIZE);
     let sizes = Sizes::of(&splats.geometry);
-    let spread = |view: &&Camera| sizes.seen_from(view.position).spread;
-    let least = |few: &[Camera]| few.iter().min_by(|a, b| spread(a).total_cmp(&spread(b))).cloned();
+    let least = |few: &[Camera]| {
+        let spreads = few.iter().map(|view| sizes.seen_from(view.position).spread);
+        let least = spreads.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        least.map(|(k, _)| few[k].clone())
+    };
     views.chunks(CHOICE).filter_map(least).collect()
 }
 

@@ -36,7 +36,7 @@ const JUDGES: usize = 24;
 /// With half as many pixels files were 16 % larger at equal quality on the large room, and about the same on scenes of up
 /// to 90,000 Gaussians (docs/METHOD.md, "How sharp").
 const MEASURED_PIXELS: Pixels = Pixels { always: 8_000_000, each: 30, most: 40_000_000 };
-/// Numbers of pixels that judge a whole scene, and a part of a scene.
+/// Numbers of pixels that judge a whole scene, and a part of a scene. Views evenly spread over a part have as many again.
 const JUDGED_PIXELS: u64 = 8_000_000;
 const PART_JUDGED_PIXELS: u64 = 2_000_000;
 /// Largest number of views that judge a part of a scene.
@@ -149,8 +149,6 @@ fn found_views(splats: &Splats) -> [usize; 2] {
 pub struct PackingViews {
     measuring: Vec<Camera>,
     judging: Vec<Camera>,
-    /// Views that judge a part of a large scene, evenly spread over its Gaussians.
-    even: Vec<Camera>,
     given: bool,
 }
 
@@ -166,27 +164,26 @@ impl PackingViews {
         let counts = found_views(splats);
         let Found { best, judges } = find(renderer, splats, every_second(1).collect(), counts, progress)?;
         let measuring = every_second(0).chain(best).collect();
-        Ok(Self { measuring, judging: judges, even: Vec::new(), given: false })
+        Ok(Self { measuring, judging: judges, given: false })
     }
 
     /// Finds views of a part of a scene, whose Gaussians are in the order of a curve: those of [`Self::found`], and [`EVEN_VIEWS`]
-    /// evenly spread over the Gaussians.
+    /// evenly spread over the Gaussians. Some of the latter judge; they are the second value. The others measure.
     pub(crate) fn found_of_part(
         renderer: &mut Renderer,
         part: &Splats,
         progress: &dyn Progress,
-    ) -> Result<Self> {
+    ) -> Result<(Self, Vec<Camera>)> {
         let mut views = Self::found(renderer, part, progress)?;
+        let mut judges = Vec::new();
         let Some([width, height]) = views.judging.first().map(|camera| [camera.width, camera.height]) else {
-            return Ok(views);
+            return Ok((views, judges));
         };
-        let even = evenly(part, EVEN_VIEWS);
-        for (k, camera) in even.iter().enumerate() {
-            let judges = k.is_multiple_of(EVEN_JUDGE_SHARE);
-            let views = if judges { &mut views.even } else { &mut views.measuring };
+        for (k, camera) in evenly(part, EVEN_VIEWS).into_iter().enumerate() {
+            let views = if k.is_multiple_of(EVEN_JUDGE_SHARE) { &mut judges } else { &mut views.measuring };
             views.push(camera.resized(width, height));
         }
-        Ok(views)
+        Ok((views, sampled(judges, PART_JUDGED_PIXELS)))
     }
 
     /// Generates views of `splats` from `viewpoints`. Half of the views that measure, and all views that judge, are around
@@ -210,12 +207,12 @@ impl PackingViews {
         measuring.extend(views(&splats.geometry, measuring.len(), width, height));
         // The number differs from that of the measuring views, so that most views are not among those.
         let judging = views(&splats.geometry, JUDGES - 1, width, height);
-        Ok(Self { measuring, judging, even: Vec::new(), given: false })
+        Ok(Self { measuring, judging, given: false })
     }
 
     /// Returns views that an earlier search found.
     pub(crate) fn of_found(measuring: Vec<Camera>, judging: Vec<Camera>) -> Self {
-        Self { measuring, judging, even: Vec::new(), given: false }
+        Self { measuring, judging, given: false }
     }
 
     /// Takes the given cameras. If some cameras are marked as training cameras, takes only those.
@@ -233,7 +230,7 @@ impl PackingViews {
         let sharp = |camera: &Camera| camera.with_max_width(DEFAULT_MAX_WIDTH);
         let measuring: Vec<Camera> = used.into_iter().step_by(stride).map(sharp).collect();
         let judging = measuring.iter().skip(1).step_by(JUDGE_SHARE).cloned().collect();
-        Ok(Self { measuring, judging, even: Vec::new(), given: true })
+        Ok(Self { measuring, judging, given: true })
     }
 
     /// Returns whether the cameras were given. Otherwise they were generated.
@@ -263,11 +260,6 @@ impl PackingViews {
     /// Returns views that judge a part of a scene, like [`Self::some_judging`]. They draw fewer pixels.
     pub(crate) fn judging_part(&self) -> Vec<Camera> {
         self.judging_by(PART_JUDGES, PART_JUDGED_PIXELS)
-    }
-
-    /// The views that judge a part of a scene and are evenly spread over its Gaussians.
-    pub(crate) fn judging_evenly(&self) -> Vec<Camera> {
-        sampled(self.even.clone(), PART_JUDGED_PIXELS)
     }
 
     fn judging_by(&self, most: usize, pixels: u64) -> Vec<Camera> {

@@ -2,13 +2,12 @@
 
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::{Progress, Sensitivity, Splats};
-use lexisplat_render::Renderer;
+use lexisplat_render::{Camera, Renderer};
 
 use crate::error::Result;
 use crate::judge::Judge;
-use crate::packing_views::PackingViews;
 use crate::refit::GAIN_FOUND;
-use crate::target::{DB_PER_HALVING, on_grid};
+use crate::target::{DB_PER_HALVING, Try, on_grid};
 
 /// Number of steps in an octave. Scores of one small scene in two units differ by up to 1 dB, which is a fifth of an
 /// octave. Finer steps would therefore often differ too.
@@ -22,8 +21,8 @@ const MOST_MOVE: f64 = 2.0;
 
 /// Returns the factor on the usual step with which pictures of `part` have a PSNR of about `decibels`.
 ///
-/// The part is packed as a scene of its own, with `views` and their `sensitivity`. The score of a file at one step gives
-/// the next step, until that step was tried before. The step of the file whose score is nearest to `decibels` is chosen. No
+/// The part is packed as a scene of its own, with its `sensitivity`. The views `judging`, which are like photographs, and the views
+/// `even`, which are evenly spread over the part, score a file. The score at one step gives the next step, until that step was tried before. The step of the file whose score is nearest to `decibels` is chosen. No
 /// file is refitted: [`GAIN_FOUND`] stands for the gain of refitting. With a second file that is refitted, and steps of
 /// quarter octaves, three copies of room-large in five parts had the same steps, in 27 % more time.
 ///
@@ -31,7 +30,7 @@ const MOST_MOVE: f64 = 2.0;
 /// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
 pub(crate) fn step_factor(
     part: &Splats,
-    views: &PackingViews,
+    [judging, even]: [&[Camera]; 2],
     sensitivity: &Sensitivity,
     options: &PackOptions,
     decibels: f64,
@@ -41,32 +40,33 @@ pub(crate) fn step_factor(
     let usual = libm::log2(packer.step_for(decibels));
     let gain = if options.may_change() { GAIN_FOUND } else { 0.0 };
     // The processor judges, also if a GPU measured the sensitivity.
-    let mut judge = Judge::of_part(Renderer::cpu(), part, &views.judging_part(), progress)?;
-    let even = views.judging_evenly();
-    let mut evenly =
-        (!even.is_empty()).then(|| Judge::of_part(Renderer::cpu(), part, &even, progress)).transpose()?;
+    let judge_of = |views: &[Camera]| Judge::of_part(Renderer::cpu(), part, views, progress);
+    let mut judges = vec![(judge_of(judging)?, 0.0)];
+    if !even.is_empty() {
+        judges.push((judge_of(even)?, EVEN_MARGIN));
+    }
     let mut log_step = on_grid(usual, STEPS_PER_OCTAVE);
-    // Each step that was tried, and by how many decibels its file misses.
-    let mut tried: Vec<(f64, f64)> = Vec::with_capacity(MOST_FILES);
-    while tried.len() < MOST_FILES {
+    let mut tries: Vec<Try> = Vec::with_capacity(MOST_FILES);
+    while tries.len() < MOST_FILES {
         let (file, _) =
             packer.quantise(libm::exp2(log_step), true, progress)?.finish(None, None, progress)?;
         let unpacked = file.unpack()?;
-        let mut reached = judge.score(&unpacked, progress)?.judged;
-        if let Some(evenly) = &mut evenly {
-            reached = reached.min(evenly.score(&unpacked, progress)?.judged + EVEN_MARGIN);
+        let mut least = f64::NAN;
+        for (judge, margin) in &mut judges {
+            least = least.min(judge.score(&unpacked, progress)?.judged + *margin);
         }
-        let off = reached + gain - decibels;
-        tried.push((log_step, off.abs()));
-        let by = (off / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE);
+        let value = least + gain;
+        tries.push(Try { log_step, value });
+        let by = ((value - decibels) / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE);
         let next = on_grid(log_step + by, STEPS_PER_OCTAVE);
-        if tried.iter().any(|(step, _)| *step == next) {
+        if tries.iter().any(|t| t.log_step == next) {
             break;
         }
         log_step = next;
     }
-    let nearest = tried.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-    let log_step = nearest.map_or(log_step, |(step, _)| step);
+    let off = |t: &Try| (t.value - decibels).abs();
+    let nearest = tries.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    let log_step = nearest.map_or(log_step, |t| t.log_step);
     Ok(libm::exp2(log_step - usual))
 }
 

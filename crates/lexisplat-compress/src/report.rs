@@ -183,7 +183,8 @@ impl CompressionReport {
     }
 
     /// Returns the report of a file that was packed part by part. `guessed` tells whether the sensitivity was guessed.
-    pub(crate) fn in_parts(done: &PackedFile, guessed: bool) -> Self {
+    #[must_use]
+    pub fn in_parts(done: &PackedFile, guessed: bool) -> Self {
         let origin = if guessed { SensitivitySource::Guess } else { SensitivitySource::Views };
         let report = Self::packed(&done.head, &done.report, &done.tensor_bytes, origin);
         Self { in_parts: true, ..report }

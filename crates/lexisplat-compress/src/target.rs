@@ -160,11 +160,11 @@ impl Target {
 
 /// A packing that was tried.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Try {
-    log_step: f64,
+pub(crate) struct Try {
+    pub(crate) log_step: f64,
     /// For a quality: decibels, which fall as the step grows. For a size: minus the binary logarithm of the bytes, which
     /// rises as the step grows.
-    value: f64,
+    pub(crate) value: f64,
 }
 
 /// Packs to the aim of `preset`. The score of a first file, which is not refitted, gives the step. If the refitted file
@@ -241,7 +241,6 @@ struct Search {
     close: f64,
     /// Largest difference of `wanted` and the expected value of a file that is refitted for the first time.
     near: f64,
-    most_tries: usize,
     log_step: f64,
     slope: f64,
 }
@@ -271,8 +270,7 @@ impl Search {
         };
         let near = if is_size { NEAR_LOG_BYTES } else { NEAR_DB };
         let log_step = log_step.clamp(limits[0], limits[1]);
-        let most_tries = if matches!(target, Target::MinPsnr(_)) { MAX_TRIES_FOR_LEAST } else { MAX_TRIES };
-        Self { target, is_size, wanted, close, near, most_tries, log_step, slope }
+        Self { target, is_size, wanted, close, near, log_step, slope }
     }
 
     /// Packs until a file meets the target closely. `floor` tells whether visible Gaussians keep a least precision. Returns
@@ -296,7 +294,8 @@ impl Search {
         // that is near enough.
         let mut passed = 0;
         let (mut nearest, mut margin) = (f64::NEG_INFINITY, 0.5 * self.close);
-        for _ in 0..self.most_tries {
+        let most = if matches!(self.target, Target::MinPsnr(_)) { MAX_TRIES_FOR_LEAST } else { MAX_TRIES };
+        for _ in 0..most {
             progress.check()?;
             let (quantised, file) = packer.quantise(libm::exp2(log_step), floor, progress)?;
             let (plain, score) = self.value(&file.0, judge, progress)?;

@@ -2,14 +2,12 @@
 
 use lexisplat::packed::Preset;
 use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
-use lexisplat::stream::PackedFile;
 use lexisplat::{Model, Progress, Splats};
 use lexisplat_render::Renderer;
 
 use crate::error::Result;
 use crate::parts;
 pub use crate::parts::in_parts;
-use crate::report::CompressionReport;
 
 /// Measures the sensitivity of a bucket with `renderer`, for the quality that `preset` aims at. Without a renderer the
 /// sensitivity is guessed from each Gaussian alone.
@@ -46,10 +44,4 @@ pub fn code(
         parts::refit(part, model, weights, looked.memo(), progress).map(Some)
     };
     coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut refit) }, progress)
-}
-
-/// Returns the report of a file that was assembled from buckets. `guessed` tells whether their sensitivity was guessed.
-#[must_use]
-pub fn report(done: &PackedFile, guessed: bool) -> CompressionReport {
-    CompressionReport::in_parts(done, guessed)
 }

@@ -10,7 +10,7 @@ use lexisplat::packed::tiles::{
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Joined, Silent, SplatSource, Splats};
-use lexisplat_compress::{Error, tiles};
+use lexisplat_compress::{CompressionReport, Error, tiles};
 use lexisplat_render::{Device, Renderer};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -468,7 +468,7 @@ pub(crate) fn tile_assemble(
     let done = without_gil(py, None, move |watch| {
         Ok(assembly.finish(&counts, gpu, output(&path, overwrite), watch)?)
     })?;
-    let mut report = tiles::report(&done, guess);
+    let mut report = CompressionReport::in_parts(&done, guess);
     report.source_bytes = source_bytes;
     json(py, &report)
 }
