@@ -52,6 +52,8 @@ impl Kind {
     /// does not tell the format.
     #[must_use]
     pub fn of(name: &str, bytes: &[u8]) -> Option<Self> {
+        // Rows of a .splat may begin with the bytes of this mark, so it is removed only for the formats that have marks.
+        let rows = bytes;
         let bytes = without_byte_order_mark(bytes);
         match bytes {
             [b'N', b'G', b'S', b'P', ..] => return Some(Self::Spz),
@@ -75,10 +77,10 @@ impl Kind {
         if let Some(kind) = is_json.then(json).flatten() {
             return Some(kind);
         }
-        if ksplat::is_likely(bytes) {
+        if ksplat::is_likely(rows) {
             return Some(Self::Ksplat);
         }
-        if splat::is_likely(bytes) {
+        if splat::is_likely(rows) {
             return Some(Self::Splat);
         }
         Self::of_extension(name).filter(|kind| matches!(kind, Self::Splat | Self::Ksplat))

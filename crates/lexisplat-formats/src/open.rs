@@ -76,7 +76,11 @@ pub fn open<'a>(
 ) -> Result<Opened<'a>> {
     let kind = Kind::of(name, bytes);
     let mut sizes = Sizes::of(bytes.len());
-    let bytes = without_byte_order_mark(bytes);
+    let bytes = match kind {
+        // Their first row may begin with the bytes of the mark.
+        Some(Kind::Splat | Kind::Ksplat) => bytes,
+        _ => without_byte_order_mark(bytes),
+    };
     let file = match kind {
         // The PLY reader refuses other files with an error that names their format.
         None | Some(Kind::Ply) => {

@@ -128,6 +128,27 @@ mod tests {
     use crate::siblings::Siblings;
 
     #[test]
+    fn rows_that_begin_like_other_files_are_rows() {
+        let mut splats = scene(&SampleOptions::new(3, 1));
+        let begins: [&[u8]; 3] = [
+            // The mark of UTF-8.
+            b"\xef\xbb\xbf\x3f",
+            // Another file has a length here, and JSON after it.
+            b"\x01\x02\x03\x3f\x01\x02\x03\x3f{\"\x03\x3f",
+            // White space and JSON.
+            b"  {\x3f",
+        ];
+        for begin in begins {
+            let mut row = [0; ROW];
+            row[..begin.len()].copy_from_slice(begin);
+            splats.geometry.positions[0] = floats(&row, 0);
+            let (bytes, _) = write(&splats);
+            let opened = open("a", &bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent).unwrap();
+            assert_eq!((opened.kind(), opened.source().len()), (Kind::Splat, 3), "{begin:?}");
+        }
+    }
+
+    #[test]
     fn what_is_written_is_read() {
         let splats = scene(&SampleOptions::new(300, 1));
         let (bytes, lost) = write(&splats);

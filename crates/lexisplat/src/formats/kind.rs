@@ -6,6 +6,8 @@ use std::fmt;
 const SPLAT_EXTENSION: &str = ".splat";
 /// Extension of the files that [`Unsupported::Ksplat`] means. Their bytes have no mark.
 const KSPLAT_EXTENSION: &str = ".ksplat";
+/// Extension of .lexi files.
+const LEXI_EXTENSION: &str = ".lexi";
 /// What to do with a scene of another format where this crate alone reads.
 const CONVERT: &str = "'lexisplat convert' makes a PLY of it, and the crate lexisplat-formats reads it";
 /// The mark of UTF-8 that some editors put before text.
@@ -71,7 +73,9 @@ impl FileKind {
             [b'P', b'K', 3, 4, ..] => Unsupported::Zip,
             [b'N', b'G', b'S', b'P', ..] => Unsupported::Spz,
             // The length before it may have any low bytes, so this comes before the marks of two bytes.
-            bytes if bytes.get(JSON_OFFSET) == Some(&b'{') => return Self::Lexi,
+            bytes if bytes.get(JSON_OFFSET) == Some(&b'{') && (is_length(bytes) || named(LEXI_EXTENSION)) => {
+                return Self::Lexi;
+            }
             [0x1f, 0x8b, ..] => Unsupported::Gzip,
             // Protocols 2 to 5.
             [0x80, 2..=5, ..] => Unsupported::Pickle,
@@ -81,6 +85,12 @@ impl FileKind {
         };
         Self::Unsupported(unsupported)
     }
+}
+
+/// Returns whether the first 8 bytes can be the length of a safetensors header: a u64 below 2^32. The first 8 bytes of a
+/// .splat are two floats, which are such a length only where the second is 0.
+fn is_length(bytes: &[u8]) -> bool {
+    bytes.get(4..JSON_OFFSET) == Some(&[0; 4])
 }
 
 impl fmt::Display for FileKind {
@@ -141,7 +151,7 @@ mod tests {
     #[test]
     fn kinds_are_told_by_their_first_bytes_or_their_name() {
         let unsupported = FileKind::Unsupported;
-        let cases: [(&str, &[u8], FileKind); 14] = [
+        let cases: [(&str, &[u8], FileKind); 16] = [
             ("a", b"\xef\xbb\xbfply\nformat", FileKind::Ply),
             ("a", b"", FileKind::Empty),
             ("a", b"ply\nformat", FileKind::Ply),
@@ -151,6 +161,9 @@ mod tests {
             // A header of 640 or 35,615 bytes is not a pickle or gzip.
             ("a", b"\x80\x02\0\0\0\0\0\0{\"", FileKind::Lexi),
             ("a", b"\x1f\x8b\0\0\0\0\0\0{\"", FileKind::Lexi),
+            // The ninth byte of a .splat may be an opening brace.
+            ("a", b"\x01\x02\x03\x04\x05\x06\x07\x3f{\x01\x02\x3f", FileKind::Unknown),
+            ("a.lexi", b"\xff\xff\xff\xff\xff\xff\xff\xff{\"", FileKind::Lexi),
             ("a.lexi", b"\x1f\x8b\x08\0", unsupported(Unsupported::Gzip)),
             ("a.ply", b"PK\x03\x04", unsupported(Unsupported::Zip)),
             ("a.ply", b"NGSP\x04\0\0\0{", unsupported(Unsupported::Spz)),
