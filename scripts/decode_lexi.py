@@ -24,7 +24,7 @@ DTYPES = {"BOOL": "u1", "U8": "u1", "I8": "i1", "F8_E5M2": "u1", "F8_E4M3": "u1"
           "U64": "<u8"}
 EXTRA_TYPES = ("I8", "U8", "I16", "U16", "I32", "U32", "F32", "F64")
 # These are the properties of 3DGS, which an extra must not be called. Normals may be extras.
-RESERVED = re.compile(r"x|y|z|opacity|f_dc_[0-2]|f_rest_(0|[1-9][0-9]*)|scale_[0-2]|rot_[0-3]")
+RESERVED = re.compile(r"x|y|z|opacity|f_dc_[0-2]|f_rest_[0-9]+|scale_[0-2]|rot_[0-3]")
 INTEGER = re.compile(r"0|[1-9][0-9]*")
 NUMBER = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 
@@ -45,6 +45,9 @@ though they are decoded. A piece of signs is printed if one of its signs is of t
 # The container
 
 def parse_json(text):
+    def integer(text):
+        return -0.0 if text == "-0" else int(text)          # an integer has no sign of its own at 0
+
     def members(pairs):
         check(len({k for k, _ in pairs}) == len(pairs), "JSON names a member twice")
         return dict(pairs)
@@ -52,34 +55,38 @@ def parse_json(text):
     def constant(name):
         raise LexiError(f"{name} is not JSON")
     try:
-        return json.loads(text, object_pairs_hook=members, parse_constant=constant)
+        value = json.loads(text, object_pairs_hook=members, parse_constant=constant, parse_int=integer)
+        json.dumps(value, ensure_ascii=False).encode()          # refuses lone surrogates
+        return value
     except (ValueError, RecursionError) as e:
         raise LexiError(f"bad JSON: {e}") from e
 
 
 def read_container(data, beginning=False):
-    """Return the metadata, the tensors as {name: (dtype, array)}, the bytes of the header, and where tensors begin and end.
+    """Return the metadata, the tensors as {name: (dtype, shape, entries)}, the bytes of the header, and where tensors lie.
 
     If data is the beginning of a file, that is only tensors that are whole, and what is there of packed.data.
     """
     check(len(data) >= 8, "the file is too short")
     length = int.from_bytes(data[:8], "little")
-    check(length <= MAX_HEADER and 8 + length <= len(data), "bad length of the header")
+    check(length <= MAX_HEADER, "the length L of the header is above 4 MiB")
+    check(8 + length <= len(data), "the length L of the header goes beyond the file")
+    check(data[8:9] == b"{", "byte 8 is not {")
     try:
         text = data[8:8 + length].decode("utf-8")
     except UnicodeDecodeError as e:
         raise LexiError("the header is not UTF-8") from e
     header = parse_json(text)
-    check(text[:1] == "{" and isinstance(header, dict), "the header is no object")
+    check(isinstance(header, dict), "the header is no object")
     meta = header.pop("__metadata__", None)
     check(isinstance(meta, dict) and all(isinstance(v, str) for v in meta.values()), "no metadata of strings")
     body = memoryview(data)[8 + length:]
     entries = []
     for name, e in header.items():
-        check(isinstance(e, dict) and set(e) == {"dtype", "shape", "data_offsets"}, f"bad entry {name}")
+        check(isinstance(e, dict) and set(e) >= {"dtype", "shape", "data_offsets"}, f"bad entry {name}")
         dtype, shape, ends = e["dtype"], e["shape"], e["data_offsets"]
         check(isinstance(dtype, str) and dtype in DTYPES, f"{name} is of an unknown type")
-        check(all(isinstance(x, list) and all(type(v) is int and v >= 0 for v in x) for x in (shape, ends))
+        check(all(isinstance(x, list) and all(type(v) is int and 0 <= v < 1 << 64 for v in x) for x in (shape, ends))
               and len(ends) == 2, f"bad shape or offsets of {name}")
         check(ends[1] - ends[0] == math.prod(shape) * np.dtype(DTYPES[dtype]).itemsize, f"bad size of {name}")
         entries.append((ends[0], ends[1], name, dtype, shape))
@@ -88,9 +95,9 @@ def read_container(data, beginning=False):
         check(begin == at and (end <= len(body) or beginning), f"{name} leaves a hole, overlaps or ends after the file")
         at = end
         if end <= len(body):
-            tensors[name] = (dtype, np.frombuffer(body[begin:end], DTYPES[dtype]).reshape(shape))
+            tensors[name] = (dtype, shape, np.frombuffer(body[begin:end], DTYPES[dtype]))
         elif name == "packed.data":
-            tensors[name] = (dtype, np.frombuffer(body[begin:], "u1"))
+            tensors[name] = (dtype, [max(len(body) - begin, 0)], np.frombuffer(body[begin:], "u1"))
     check(at == len(body) or beginning, "bytes follow the last tensor")
     return meta, tensors, data[:8 + length], {name: (begin, end) for begin, end, name, _, _ in entries}
 
@@ -106,54 +113,53 @@ def check_version(meta):
     return version, layout
 
 
-def check_sums(meta, tensors, head, version, beginning):
+def check_sums(meta, tensors, head, version, names):
     if version == PACKED:
-        dtype, own = tensors.get("packed.head", (None, None))
-        check(dtype == "U8" and own.ndim == 1 and len(own) >= 4, "no packed.head")
+        dtype, shape, own = tensors.get("packed.head", (None, [], None))
+        check(dtype == "U8" and len(shape) == 1 and len(own) >= 4, "no packed.head")
         own = own.tobytes()
         check(zlib.crc32(head + own[4:]) == int.from_bytes(own[:4], "little"), "the header or packed.head is damaged")
         bare = {"packed.head", "packed.data"}
-        sums = parse_json(meta.get("checksums", "{}"))
-        check(isinstance(sums, dict) and (beginning or set(sums) == set(tensors) - bare) and not set(sums) & bare,
-              "checksums do not fit the tensors")
-        check_tensors({k: v for k, v in sums.items() if k in tensors}, tensors)
-        return
-    dtype, value = tensors.get("checksum.header", (None, None))
-    check(dtype == "U32" and value.shape == (1,), "no checksum of the header")
-    check(zlib.crc32(head) == int(value[0]), "the header is damaged")
-    sums = parse_json(meta.get("checksums", ""))
-    check(isinstance(sums, dict) and set(sums) == set(tensors) - {"checksum.header"}, "checksums do not fit the tensors")
-    check_tensors(sums, tensors)
-
-
-def check_tensors(sums, tensors):
-    for name, text in sums.items():
-        check(text == f"{zlib.crc32(tensors[name][1].tobytes()):08x}", f"tensor {name} is damaged")
+    else:
+        dtype, shape, value = tensors.get("checksum.header", (None, [], None))
+        check(dtype == "U32" and shape == [1], "no checksum of the header")
+        check(zlib.crc32(head) == int(value[0]), "the header is damaged")
+        bare = {"checksum.header"}
+    sums = parse_json(meta.get("checksums", "{}" if version == PACKED else ""))
+    check(isinstance(sums, dict) and set(sums) == names - bare,
+          "checksums are not of all tensors that have one, and of nothing else")
+    for name in sums.keys() & tensors.keys():
+        check(sums[name] == f"{zlib.crc32(tensors[name][2].tobytes()):08x}", f"tensor {name} is damaged")
 
 
 # Metadata
 
 def whole(meta, key, limit):
     text = meta.get(key, "")
-    check(INTEGER.fullmatch(text) is not None and int(text) < limit, f"bad metadata {key}")
+    check(INTEGER.fullmatch(text) is not None and len(text) <= 20 and int(text) < limit,
+          f"metadata {key} is not an integer below {limit}")
     return int(text)
 
 
 def real(meta, key):
     text = meta.get(key, "")
-    check(NUMBER.fullmatch(text) is not None, f"bad metadata {key}")
+    check(NUMBER.fullmatch(text) is not None, f"metadata {key} is not a number as in JSON")
     check(math.isfinite(float(text)) and float(text) >= 0, f"{key} is negative or not finite")
+
+
+def finite(v):
+    return type(v) in (int, float) and abs(v) <= sys.float_info.max     # an integer may be too large for f64
 
 
 def check_object(meta, key, numbers, target):
     if key not in meta:
         return
     o = parse_json(meta[key])
-    check(isinstance(o, dict) and set(o) == set(numbers) | {"views", "cameras"} | ({"kind"} if target else set()),
+    check(isinstance(o, dict) and set(o) >= set(numbers) | {"views", "cameras"} | ({"kind"} if target else set()),
           f"bad members of {key}")
-    check(all(type(o[k]) in (int, float) and math.isfinite(o[k]) for k in numbers), f"bad numbers of {key}")
-    check(type(o["views"]) is int and o["views"] >= 0 and type(o["cameras"]) is bool, f"bad views or cameras of {key}")
-    check(not target or o["kind"] in ("psnr", "min-psnr", "size"), f"bad kind of {key}")
+    check(all(finite(o[k]) for k in numbers), f"bad numbers of {key}")
+    check(type(o["views"]) is int and 0 <= o["views"] < 1 << 32 and type(o["cameras"]) is bool, f"bad views or cameras of {key}")
+    check(not target or isinstance(o["kind"], str), f"bad kind of {key}")
 
 
 def offset_of(meta):
@@ -161,8 +167,8 @@ def offset_of(meta):
     if "offset" not in meta:
         return None
     offset = parse_json(meta["offset"])
-    check(isinstance(offset, list) and len(offset) == 3 and all(type(v) in (int, float) and math.isfinite(v) for v in offset),
-          "bad metadata offset")
+    check(isinstance(offset, list) and len(offset) == 3 and all(map(finite, offset)),
+          "metadata offset is not a list of three finite numbers")
     return [float(v) for v in offset]
 
 
@@ -176,9 +182,10 @@ def check_packed_metadata(meta):
     for key in ("tolerance", "max_residual", "rms_residual"):
         if key in meta:
             real(meta, key)
-    check(meta.get("antialiased", "false") in ("true", "false"), "bad metadata antialiased")
+    check(meta.get("antialiased", "false") in ("true", "false"), "metadata antialiased is neither true nor false")
     comments = parse_json(meta.get("comments", "[]"))
-    check(isinstance(comments, list) and all(isinstance(c, str) for c in comments), "bad metadata comments")
+    check(isinstance(comments, list) and all(isinstance(c, str) for c in comments),
+          "metadata comments is not a JSON list of strings")
     offset_of(meta)
     check_object(meta, "target", ("asked", "mean_psnr", "min_psnr"), True)
     check_object(meta, "reached", ("judged_psnr", "mean_psnr", "min_psnr"), False)
@@ -188,7 +195,7 @@ def check_packed_metadata(meta):
 def check_metadata(meta):
     """Check every key of a file of the other layouts, and return the degree."""
     degree = whole(meta, "degree", 5)
-    check(meta.get("pursuit") in ("omp", "ols"), "bad metadata pursuit")
+    check(meta.get("pursuit") in ("omp", "ols"), "metadata pursuit is neither omp nor ols")
     if "max_nonzeros" in meta:
         whole(meta, "max_nonzeros", 256)
     else:
@@ -198,10 +205,11 @@ def check_metadata(meta):
             real(meta, key)
     whole(meta, "seed", 1 << 64)
     whole(meta, "over_tolerance", 1 << 64 if "max_nonzeros" in meta else 1)
-    check(meta.get("antialiased") in ("true", "false"), "bad metadata antialiased")
+    check(meta.get("antialiased") in ("true", "false"), "metadata antialiased is neither true nor false")
     check("generator" in meta, "no metadata generator")
     comments = parse_json(meta.get("comments", ""))
-    check(isinstance(comments, list) and all(isinstance(c, str) for c in comments), "bad metadata comments")
+    check(isinstance(comments, list) and all(isinstance(c, str) for c in comments),
+          "metadata comments is not a JSON list of strings")
     offset_of(meta)
     return degree
 
@@ -216,17 +224,17 @@ class Tensors:
 
     def take(self, name, dtype, shape):
         check(name in self.left, f"no tensor {name}")
-        kind, array = self.left.pop(name)
-        check(kind == dtype and len(array.shape) == len(shape)
-              and all(s is None or s == a for s, a in zip(shape, array.shape)), f"bad type or shape of {name}")
-        return array
+        kind, own, entries = self.left.pop(name)
+        check(kind == dtype, f"{name} is not of type {dtype}")
+        check(len(own) == len(shape) and all(s is None or s == a for s, a in zip(shape, own)), f"bad shape of {name}")
+        return entries.reshape(own)
 
     def extras(self, n, coded=False):
         result = {}
         for name in [x for x in self.left if x.startswith("extra.")]:
             own = name[6:]
             check(own and not any(c.isspace() or unicodedata.category(c) == "Cc" for c in own) and not RESERVED.fullmatch(own),
-                  f"bad name {name}")
+                  f"an extra must not be named as {name}")
             if coded:
                 result[own] = lexi3.read_column(self.take(name, "U8", (None,)).tobytes(), n)
                 continue
@@ -255,7 +263,8 @@ def sh_row(d, atoms, indices, values):
 
 def decode_plain(t, layout, d):
     """Decode layouts f32, f16 and paper."""
-    n = len(t.left["position"][1]) if "position" in t.left and t.left["position"][1].ndim else 0
+    _, shape, _ = t.left.get("position", (None, [], None))
+    n = shape[0] if shape else 0
     check(n < (1 << 32) - 1, "too many Gaussians")
     out = {k: t.take(k, "F32", s) for k, s in (("position", (n, 3)), ("dc", (n, 3)), ("opacity", (n,)),
                                                ("scale", (n, 3)), ("rotation", (n, 4)))}
@@ -267,7 +276,7 @@ def decode_plain(t, layout, d):
     if d:
         atoms = t.take("dictionary", "F32", (None, d))
         m = len(atoms)
-        check(1 <= m <= 1024, "bad number of atoms")
+        check(1 <= m <= 1024, "m is not from 1 to 1024")
         check_atoms(atoms)
         if layout == "paper":
             ends = t.take("codes.pointers", "I32", (n + 1,)).astype(np.int64)
@@ -291,7 +300,8 @@ def decode_plain(t, layout, d):
         if "escapes.rows" in t.left:
             who = t.take("escapes.gaussians", "U32", (None,)).astype(np.int64)
             rows = t.take("escapes.rows", "F32", (len(who), d))
-            check((np.diff(who) > 0).all() and (who < n).all() and not counts[who].any(), "bad escapes")
+            check((np.diff(who) > 0).all() and (who < n).all() and not counts[who].any(),
+                  "escapes.gaussians does not ascend, is not below N, or has nonzeros")
             check(np.isfinite(rows).all(), "an escape is not finite")
             rest[who] = rows
         check(np.isfinite(rest).all(), "SH-rest is not finite")
@@ -308,7 +318,7 @@ def decode_packed(t, meta, d, header, places, beginning, trace):
     check(n <= 3 * (header + max(end for _, end in places.values())), "more Gaussians than the file has room for")
     check("packed.data" in places, "no packed.data")
     begin, end = places["packed.data"]
-    size = len(t.left["packed.data"][1]) if "packed.data" in t.left else 0
+    size = len(t.left["packed.data"][2]) if "packed.data" in t.left else 0
     data = t.take("packed.data", "U8", (size,)).tobytes() if "packed.data" in t.left or not beginning else b""
     head = lexi3.Head(t.take("packed.head", "U8", (None,)).tobytes(), n, end - begin, d)
     order = None
@@ -341,7 +351,7 @@ def decode(data, beginning=False, trace=None):
         packed = version == PACKED
         check(packed or not beginning, "only packed files can be decoded in part")
         check(packed or trace is None, "only packed files can be traced")
-        check_sums(meta, tensors, head, version, beginning)
+        check_sums(meta, tensors, head, version, set(places))
         degree = check_packed_metadata(meta) if packed else check_metadata(meta)
         d = 3 * ((degree + 1) ** 2 - 1)
         t = Tensors(tensors)

@@ -20,10 +20,8 @@ NAMES = ("Cell", "ColourClass", "ShapeClass", "Scale0", "Scale1", "Scale2", "Opa
 TARGETS = (SCALE, SCALE + 1, SCALE + 2, OPACITY, DC, DC + 1, DC + 2)
 # Order of the sets of contexts: streams 0 to 15 three times, then the others.
 SETS = [*range(16)] * 3 + [*range(16, 29)]
-KIND = [3, 0] + [2] * 14 + [1] * 3 + [0] * 3 + [1] * 3 + [0] + [2] * 3
 DROP = np.array([0, 2, 3], I)
 POWERS = np.array([1 << k for k in range(63)], I)
-WEIGHTS = [32, 35, 38, 41, 45, 49, 54, 59]
 S, T, U, V = 0.5773502691896257, 0.7071067811865476, 0.4082482904638631, 0.8164965809277261
 COLUMN_TYPES = ("i1", "u1", "<i2", "<u2", "<i4", "<u4", "<f4", "<f8")
 
@@ -44,7 +42,7 @@ class Bytes:
         self.data, self.at = bytes(data), 0
 
     def take(self, n):
-        check(self.at + n <= len(self.data), "something goes beyond its end")
+        check(self.at + n <= len(self.data), "packed.head or a column ends within a field")
         self.at += n
         return self.data[self.at - n:self.at]
 
@@ -65,14 +63,22 @@ class Bytes:
                 return value
             shift += 7
 
-    def short(self, n):
-        return struct.unpack("<f", bytes(4 - n) + self.take(n))[0]
+    def f32(self, n):
+        return self.floats([self.take(4) for _ in range(n)])
+
+    def bf16(self, n):
+        return self.floats([bytes(2) + self.take(2) for _ in range(n)])
+
+    def floats(self, pieces):
+        values = [struct.unpack("<f", x)[0] for x in pieces]
+        check(all(map(math.isfinite, values)), "an f32 or bf16 of packed.head is not finite")
+        return values
 
     def end(self):
         return self.at == len(self.data)
 
 
-# Bits with odds: tables and dictionary
+# Bits with odds: integers, tables and dictionary
 
 class Odds:
     def __init__(self):
@@ -88,23 +94,29 @@ def either_odds():
 
 
 class OddBits:
-    def __init__(self, data):
-        self.data, self.at = data, 4
-        self.range, self.code = 2 ** 32 - 1, int.from_bytes((data + bytes(4))[:4], "big")
+    def __init__(self, data, what):
+        self.what = what
+        check(len(data) % 2 == 0, f"the {what} are not of whole words")
+        self.words = iter(np.frombuffer(data, "<u2").tolist())
+        self.state = self.word() << 16 | self.word()
+        check(self.state >= 1 << 16, f"the first state of the {what} is below 2^16")
+
+    def word(self):
+        word = next(self.words, None)
+        check(word is not None, f"the {self.what} go beyond their words")
+        return word
 
     def split(self, p):
-        bound = (self.range >> 12) * p
-        b = int(self.code >= bound)
-        if b:
-            self.code -= bound
-            self.range -= bound
-        else:
-            self.range = bound
-        while self.range < 1 << 24:
-            self.range <<= 8
-            self.code = (self.code << 8) % 2 ** 32 + (self.data[self.at] if self.at < len(self.data) else 0)
-            self.at += 1
+        low = self.state & 4095
+        b = int(low >= p)
+        self.state = (self.state >> 12) * (4096 - p if b else p) + low - (p if b else 0)
+        if self.state < 1 << 16:
+            self.state = self.state << 16 | self.word()
         return b
+
+    def finish(self):
+        check(next(self.words, None) is None, f"words of the {self.what} are left")
+        check(self.state == 1 << 16, f"the last state of the {self.what} is not 2^16")
 
     def bit(self, o):
         b = self.split(o.zero)
@@ -136,14 +148,10 @@ class OddBits:
 
 
 def probabilities(weights, w):
-    total = sum(weights)
-    p = [max((x << w) // total, 1) if x else 0 for x in weights]
-    left = (1 << w) - sum(p)
-    while left:
-        s = p.index(max(p))
-        d = left if left > 0 else max(left, -(p[s] // 2))
-        p[s] += d
-        left -= d
+    """Of symbols with these weights; the weight of one that does not occur is 0."""
+    total, n = sum(weights), sum(x > 0 for x in weights)
+    p = [1 + x * ((1 << w) - n) // total if x else 0 for x in weights]
+    p[p.index(max(p))] += (1 << w) - sum(p)
     return p
 
 
@@ -151,10 +159,9 @@ class Tables:
     """For each number of 0 to 2^w - 1, and each table, the symbol and what becomes of the state."""
 
     def __init__(self, data):
-        bits = OddBits(data)
-        self.used, self.many, self.same, self.new, self.grain = odds(2), odds(), odds(2), odds(), odds(3)
-        self.counts, self.present = odds(4, 10), odds(4, 2, 2)
-        self.deltas = [[[either_odds() for _ in range(3)] for _ in range(2)] for _ in range(4)]
+        bits = OddBits(data, "tables")
+        self.used, self.many, self.same, self.new = odds(2), odds(), odds(2), odds()
+        self.counts, self.present, self.delta = odds(10), odds(2), either_odds()
         self.place = np.full(len(SETS) * 24, -1, I)     # where the table of a context begins, -1 if there is none
         p, rest, symbol = [], [], []
         at = before = 0
@@ -165,12 +172,13 @@ class Tables:
             count, table_of = self.contexts(bits)
             w = 12 if ATOM <= stream < ATOM + 3 else 10
             for _ in range(count):
-                probability = self.table(bits, KIND[stream], w)
+                probability = self.table(bits, w)
                 p.append(np.repeat(probability, probability))
                 symbol.append(np.repeat(np.arange(len(probability)), probability))
                 rest.append(np.arange(1 << w) - np.repeat(np.cumsum(probability) - probability, probability))
             self.place[number * 24:number * 24 + 24] = at + (np.array(table_of) << w)
             at += count << w
+        bits.finish()
         self.p, self.rest, self.symbol = (np.concatenate(x or [[0]]).astype(I) for x in (p, rest, symbol))
 
     def contexts(self, bits):
@@ -180,45 +188,35 @@ class Tables:
             if several:
                 changed = bits.bit(self.same[1 if context > 1 and changed else 0])
                 if changed:
-                    last = tables if bits.bit(self.new) else bits.even((tables - 1).bit_length())
-                    check(last <= tables, "a table is named that is not there")
+                    new = bits.bit(self.new)
+                    last = tables if new else bits.even((tables - 1).bit_length())
+                    check(new or last < tables, "a table that is named is not below T")
                 tables = max(tables, last + 1)
             table_of.append(last)
         return tables, table_of
 
-    def table(self, bits, kind, w):
-        size = bits.positive(self.counts[kind])
-        check(size <= 256, "a table has too many symbols")
-        h = bits.bit(self.grain[0])
-        g = 2 * h + bits.bit(self.grain[1 + h])
-        sign, occurs, levels, weights = 0, [], [], []
+    def table(self, bits, w):
+        size = bits.positive(self.counts)
+        check(size <= 256, "S of a table is above 256")
+        occurs, weights = 1, []
         for i in range(size):
-            parent = i - 2 if kind == 2 and 2 <= i < 16 else i - 1
-            which = self.present[kind][i == 0 or occurs[parent]][i == 0 or occurs[i - 1]]
-            occurs.append(1 if i == size - 1 else bits.bit(which))
+            occurs = 1 if i == size - 1 else bits.bit(self.present[occurs])     # of the symbol before
             if i == 0:
-                level = bits.even(4 + g)
-            else:
-                level = max(levels[parent] - (3 << g if i == 16 and kind > 0 else 0), 0)
-                if occurs[i]:
-                    delta = bits.either(self.deltas[kind][i >= 16][sign])
-                    level += delta
-                    sign = 0 if delta == 0 else 1 if delta > 0 else 2
-            check(0 <= level <= w << g, "a level of a table is out of range")
-            levels.append(level)
-            up = 8 * w - (level << 3 - g)
-            weights.append(WEIGHTS[up % 8] << (up >> 3) if occurs[i] else 0)
+                level = bits.even(5)
+            elif occurs:
+                level += bits.either(self.delta)
+            check(0 <= level <= 2 * w, "a level of a table is not from 0 to 2w")
+            up = 2 * w - level
+            weights.append((32, 45)[up % 2] << (up >> 1) if occurs else 0)
         return np.array(probabilities(weights, w))
 
 
 def read_dictionary(data, m, d, fixed):
-    if d == 0:
-        check(not data, "a dictionary at degree 0")
-        return np.zeros((0, 0), F)
-    bits, n = OddBits(data), d // 3
+    learned, n, atoms = m - d if fixed else m, d // 3, np.zeros((m, d), F)
+    check(learned or not data, "the dictionary is not empty, though no atom is learned")
+    bits = OddBits(data, "numbers of the dictionary") if learned else None
     o = [[[either_odds() for _ in range(5)] for _ in range(3)] for _ in range(4)]
-    atoms = np.zeros((m, d), F)
-    for atom in atoms[:m - d if fixed else m]:
+    for atom in atoms[:learned]:
         x = [[0, 0, 0] for _ in range(n)]
         for k in range(n):
             for a in range(3):
@@ -226,7 +224,7 @@ def read_dictionary(data, m, d, fixed):
                     return abs(x[j][b]) if j >= 0 else 0
                 near = size(k - 1, 0) + size(k - 2, 0) if a == 0 else size(k - 1, a) + (size(k, 0) >> 1)
                 x[k][a] = bits.either(o[min(math.isqrt(k + 1) - 1, 3)][a][min(near.bit_length(), 4)])
-                check(abs(x[k][a]) < 1 << 15, "a number of the dictionary is too large")
+                check(abs(x[k][a]) < 1 << 15, "a number of the dictionary is above 2^15 - 1 in size")
         c = ([v[0] * S + v[1] * T + v[2] * U for v in x] + [v[0] * S + v[1] * 0.0 - v[2] * V for v in x]
              + [v[0] * S - v[1] * T + v[2] * U for v in x])
         norm = 0.0
@@ -235,6 +233,8 @@ def read_dictionary(data, m, d, fixed):
         if norm == 0:
             c[0] = norm = 1.0
         atom[:] = np.array(c) / math.sqrt(norm)
+    if learned:
+        bits.finish()
     if fixed:
         for a, parts in enumerate(((S, S, S), (T, 0, -T), (U, -V, U))):
             for k in range(n):
@@ -251,27 +251,27 @@ class Head:
         self.d, self.m = d, b.varint()
         flags = b.u8()
         views, self.parts, self.promised = flags & 15, flags >> 4 & 3, flags >> 6 & 1
-        check(self.m <= 1024 and (self.m > 0) == (d > 0) and (self.parts > 0) == (d > 0), "bad numbers of atoms or parts")
-        check(flags < 128 or self.m >= d > 0, "bad fixed atoms")
+        check((1 <= self.m <= 1024) if d else self.m == 0, "m is not from 1 to 1024, or not 0 at degree 0")
+        check((self.parts > 0) == (d > 0), "P is not from 1 to 3, or not 0 at degree 0")
+        check(flags < 128 or self.m >= d > 0, "atoms are `fixed`, but m < d or d = 0")
         self.dc_exponent = b.u8()
         self.interim, self.dc_exponent = self.dc_exponent >> 7, self.dc_exponent & 127
-        check(self.dc_exponent <= 100, "bad dc_exponent")
+        check(self.dc_exponent <= 100, "dc_exponent is above 100")
         self.least = [*b.take(self.parts - 1), 1] if self.parts else []
-        check(all(x > y for x, y in zip(self.least, self.least[1:])), "least sizes do not fall")
+        check(all(x > y for x, y in zip(self.least, self.least[1:])), "least does not fall strictly, or is not above 1")
         self.interim_step = [b.varint() for _ in range(3)] if self.interim else [1] * 3
-        check(all(1 <= x <= 1 << 26 for x in self.interim_step), "bad interim_step")
-        *origin, self.side, self.value_step = b.unpack("5f")
-        self.origin, self.dc_mean = np.array(origin), np.array(b.unpack("3f"))
-        turn = b.unpack("4h")
+        check(all(1 <= x <= 1 << 26 for x in self.interim_step), "interim_step is not from 1 to 2^26")
+        self.origin, (self.side, self.value_step) = np.array(b.f32(3)), b.f32(2)
+        check(self.side > 0, "side is not above 0")
+        check(self.value_step > 0, "value_step is not above 0")
+        self.dc_mean, turn = np.array(b.f32(3)), b.unpack("4h")
         check(any(turn), "dc_turn is 0")
         self.dc_axes = axes_of(*turn)
-        self.softening = b.short(3) if views else 1.0
-        self.points = np.array([[b.short(3) for _ in range(3)] for _ in range(views)]).reshape(views, 3)
-        check(np.isfinite([*origin, self.side, self.value_step, *self.dc_mean, self.softening]).all()
-              and np.isfinite(self.points).all() and min(self.side, self.value_step, self.softening) > 0,
-              "a number of the head is out of range")
+        self.softening = b.f32(1)[0] if views else 1.0
+        check(2.0 ** -60 <= self.softening <= 2.0 ** 60, "softening is not from 2^-60 to 2^60")
+        self.points = np.array(b.f32(3 * views)).reshape(views, 3)
         steps = [b.unpack("Hb") for _ in range(5)]
-        check(all(-6 <= h <= 31 for _, h in steps), "bad shift of a step")
+        check(all(-6 <= h <= 31 for _, h in steps), "the shift of a step is not from -6 to 31")
         self.steps = np.array([[min(max(M << min(c - h, 6) if c >= h else M >> h - c, 1), 3 << 19) for c in range(16)]
                                for M, h in steps], I)
         self.read_integers(b.take(b.varint()))
@@ -281,21 +281,13 @@ class Head:
         check(b.end(), "bytes of the head are left")
 
     def read_integers(self, data):
-        number, at = int.from_bytes(data, "little"), 0
-
-        def bits(n):
-            nonlocal at
-            check(at + n <= 8 * len(data), "the integers go beyond their end")
-            at += n
-            return number >> at - n & (1 << n) - 1
+        bits = OddBits(data, "integers")
 
         def group(count, zeros):
-            width = bits(5)
-            check(width + zeros <= 16, "an integer is too wide")
-            values = np.array([bits(width) for _ in range(count)], I)
-            values -= values >> max(width - 1, 0) << width
-            check(width == (1 + bitlength(values ^ values >> 63)[values != 0]).max(initial=0), "a width is not the least")
-            return values << zeros
+            o = either_odds()
+            values = [bits.either(o) << zeros for _ in range(count)]
+            check(all(-1 << 15 <= x < 1 << 15 for x in values), "one of the integers is not from -32768 to 32767")
+            return np.array(values, I)
         self.cell_log = int(group(1, 2)[0])
         self.turn, self.move, self.predictor = np.zeros((3, 4), I), np.zeros((3, 4), I), np.zeros((7, 7), I)
         for rows in (self.turn, self.move):
@@ -306,24 +298,25 @@ class Head:
         for k in range(1, 7):
             first = max(k - 3, 0)
             self.predictor[first:, k] = group(7 - first, 4)
-        check(8 * len(data) - at < 8 and bits(8 * len(data) - at) == 0, "bits of the integers are left")
+        bits.finish()
 
     def read_index(self, b, total, size):
         layers = b.u8()
         in_order, layers = layers >> 7, layers & 127
-        check(layers <= 8, "too many layers")
+        check(layers <= 8, "there are more than 8 layers")
         levels = list(b.take(layers))
-        check(all(r <= 2 for r in levels), "too many refinements")
+        check(all(r <= 2 for r in levels), "R of a layer is above 2")
         self.layer, self.count, self.cell, self.bounds = [], [], [], []
         chunks = b.varint()
         for c in range(chunks):
             self.layer.append(b.u8())
             self.count.append(b.varint())
             self.cell.append(b.varint(64))
-            self.bounds.append([b.short(2) for _ in range(6)] if chunks > 1 else None)
-            check(1 <= self.count[c] <= 65536 and self.layer[c] < layers, "bad chunk")
-            check(not self.bounds[c] or np.isfinite(self.bounds[c]).all(), "a bound is not finite")
-            check(c == 0 or (self.layer[c - 1], self.cell[c - 1]) <= (self.layer[c], self.cell[c]), "chunks are not in order")
+            self.bounds.append(b.bf16(6) if chunks > 1 else None)
+            check(self.layer[c] < layers, "the layer of a chunk is not there")
+            check(1 <= self.count[c] <= 65536, "a chunk has not from 1 to 65536 Gaussians")
+            check(c == 0 or (self.layer[c - 1], self.cell[c - 1]) <= (self.layer[c], self.cell[c]),
+                  "`cell` of a chunk falls, or chunks do not come layer by layer")
         check(sum(self.count) == total, "chunks do not have N Gaussians")
         self.first = np.concatenate([[0], np.cumsum(self.count)]).astype(I)
         self.refinements = [levels[layer] for layer in self.layer]
@@ -331,18 +324,16 @@ class Head:
                  for r, layer in zip(self.refinements, self.layer)]
         in_turn = [(c, k) for c in range(chunks) for k in range(kinds[c])]
         self.ranges, start = {}, 0                       # of (chunk, kind): start, length and both CRC-32
-        order = []
         for key in in_turn:
             if not in_order:
                 key = (b.varint(), b.u8())
-                check(key[0] < chunks and key[1] < kinds[key[0]] and key not in self.ranges, "bad range")
+                check(key[0] < chunks and key[1] < kinds[key[0]], "a range has a chunk or a kind that is not there")
+                check(key not in self.ranges, "a range is listed twice")
                 check(key[1] == 0 or (key[0], 0) in self.ranges, "a range is before its base")
             length, *sums = b.varint(), *b.unpack("2I")
-            check(key[1] or 8 * length >= 3 * self.count[key[0]], "a base is too short")
+            check(key[1] or 8 * length >= 3 * self.count[key[0]], "a base has less than 3 bits a Gaussian")
             self.ranges[key] = (start, length, *sums)
             start += length
-            order.append(key)
-        check(bool(in_order) == (order == in_turn), "`sorted` is not true")
         check(size == start, "ranges do not have the length of packed.data")
 
 
@@ -377,8 +368,8 @@ class Lanes:
             check(len(data) % 2 == 0 and len(data) >= head, "a range is not of whole words")
             sizes = np.frombuffer(data[:head], f"<u{width}").tolist()
             sizes.append((len(data) - head) // 2 - sum(sizes))
-            check(min(sizes) >= 2, "a lane is too short")
-            check(sum(sizes) <= 1 << 30, "a range has too many words")
+            check(min(sizes) >= 2, "a lane has less than two words")
+            check(sum(sizes) <= 1 << 30, "a range has more than 2^30 words")
             words.append(data[head:])
             for k, size in enumerate(sizes):
                 length = n // q + (k < n % q)
@@ -391,7 +382,7 @@ class Lanes:
         self.next, self.stop = lanes[:, 3] + 2, lanes[:, 4]
         self.state = (self.words[self.next - 2] << 16) + self.words[self.next - 1]
         self.lane, self.steps = np.arange(len(lanes)), int(self.length.max(initial=0))
-        check((self.state >= 1 << 16).all(), "a first state is too small")
+        check((self.state >= 1 << 16).all(), "the first state of a lane is below 2^16")
         # The lane that is traced, none if it has no such range, and of which Gaussian what it takes is.
         self.traced = np.flatnonzero(self.first == 0) if trace else self.lane[:0]
         self.of(0)
@@ -424,7 +415,8 @@ class Lanes:
         check((self.next <= self.stop).all(), "a lane goes beyond its words")
 
     def finish(self):
-        check((self.next == self.stop).all() and (self.state == 1 << 16).all(), "words of a lane are left")
+        check((self.next == self.stop).all() and (self.state == 1 << 16).all(),
+              "words of a lane are left, or its last state is not 2^16")
 
     def put(self, state, who):
         at, low = self.next[who], state < 1 << 16
@@ -524,7 +516,7 @@ def decode_base(head, lanes, out):
         a = len(here)
         gap = lanes.integer(CELL, np.minimum(g[who], 23), who, 61)
         z[who] += gap
-        check((z[who] >= 0).all(), "a cell is out of range")            # below 2^63, else it has become negative
+        check((z[who] >= 0).all(), "Z is not below 2^63")            # below 2^63, else it has become negative
         g[who] = bitlength(gap)
         cell = xyz_of(z[who])
 
@@ -541,11 +533,11 @@ def decode_base(head, lanes, out):
             around = np.concatenate([head.means, [0, 0]])[:, None].repeat(a, 1)
 
         colour = lanes.symbol(COLOUR, 1 + level(around[7]) if used else 0, who)
-        check((colour <= 15).all(), "a class is out of range")
+        check((colour <= 15).all(), "colour is not from 0 to 15")
         expected = np.clip(512 * colour + around[8], 0, 15 * 512)
         below = (expected - 128 >> 9) << 9
         shape = level(expected) + lanes.signed(SHAPE, 1 + level(2 * (expected - below)) if used else 0, who)
-        check(((shape >= 0) & (shape <= 15)).all(), "a class is out of range")
+        check(((shape >= 0) & (shape <= 15)).all(), "shape is not from 0 to 15")
 
         features = np.zeros((9, a), I)
         known = np.zeros((6, a), I)                      # F; scales come as they are decoded
@@ -590,7 +582,7 @@ def decode_refinement(head, lanes, out):
             count = out.count[j, here]
             stream, context = (FINE_DC, out.colour[here] // 2) if j < 7 else (FINE_POSITION, out.fineness[j - 7, here] // 3)
             t = lanes.symbol(stream, 3 * context + np.minimum(abs(count), 2), who)
-            check((t <= 2).all(), "a refinement is out of range")
+            check((t <= 2).all(), "a symbol of FineDc or FinePosition is above 2")
             out.count[j, here] = wrap(3 * count + np.where(count >= 0, t - 1, 1 - t))
         for j in range(3):
             full = out.full[j, here]
@@ -616,14 +608,14 @@ def decode_part(head, p, lanes, out):
         colour, exact = out.colour[here], out.exact[here]
         if p == 0:
             count = lanes.integer(COUNT, 2 * np.minimum(colour, 11) + (last[who] > 1), who)
-            check((count <= head.d + 1).all(), "a Gaussian has too many nonzeros")
+            check((count <= head.d + 1).all(), "a count of part 0 is above d + 1")
             exact = out.exact[here] = count == head.d + 1
             count = last[who] = np.where(exact, 0, count)
         else:
             count, plain = np.zeros(len(here), I), np.flatnonzero(~exact)
             before = out.nonzeros[p - 1, here[plain]]
             count[plain] = lanes.integer(COUNT + p, 3 * (colour[plain] // 2) + np.minimum(before, 2), plain)
-            check((count <= head.d).all(), "a Gaussian has too many nonzeros")
+            check((count <= head.d).all(), "a count of nonzeros is above d")
         out.nonzeros[p, here] = count
         block.append((here, count, exact))
         if i % 64 == 63 or i == lanes.steps - 1:
@@ -660,8 +652,8 @@ def decode_nonzeros(head, p, lanes, block, top):
         atom[at] = 256 * page + lanes.symbol(ATOM + p, 2 * np.minimum(page, 3) + np.where(first[at], 0, 1), who)
         context = np.where(first[at], np.minimum(count[at] - 1, 7), 8 + np.minimum(excess[at - 1], 15))
         excess[at] = lanes.integer(VALUE + p, context, who)
-    check((atom < head.m).all(), "an atom is out of range")
-    check((excess < top).all(), "a size is not one of its part")
+    check((atom < head.m).all(), "an atom is not below m")
+    check((excess < top).all(), "an excess is above the sizes of its part")
     size = excess + head.least[p]
     for j in range(0, int(total.max()), 16):
         who = np.flatnonzero(total > j)
@@ -734,7 +726,8 @@ def decode_ranges(head, data, trace=None):
         out.lack[head.first[c]:head.first[c + 1]] = R[c]
     run(lambda c: 0, lambda lanes: decode_base(head, lanes, out),
         lambda: rows(out.cell, out.colour, out.shape, out.count, out.rotation), lambda c: 16 * R[c])
-    check(all(int(out.z[head.first[c]]) == head.cell[c] for c in chunks if (c, 0) in whole), "`cell` is not true")
+    check(all(int(out.z[head.first[c]]) == head.cell[c] for c in chunks if (c, 0) in whole),
+          "`cell` of the index is not that of the chunk's first Gaussian")
     for k in range(1, max(R, default=0) + 1):
         run(lambda c: k if k <= R[c] else None, lambda lanes: decode_refinement(head, lanes, out),
             lambda: rows(out.count, out.rotation), lambda c: 16 * (R[c] + 1 - k))
@@ -796,7 +789,7 @@ def values_of(head, out, there):
     values = np.array(values).reshape(7, -1)
     apply_interim(head, out, there, values)
     values = values[:, there]
-    check(((values >= -1 << 27) & (values < 1 << 27)).all(), "a value of a target is out of range")
+    check(((values >= -1 << 27) & (values < 1 << 27)).all(), "one of values is not from -2^27 to 2^27 - 1")
     lack, full = out.lack[there], out.full[:, there]
     size = 2.0 ** (full - drop(full, lack))
     i, j, h = (out.rotation[:, there] + 0.5) / size
@@ -833,7 +826,7 @@ def values_of(head, out, there):
         n = head.d // 3
         weight = np.zeros((n, len(lack)))
         for point in head.points:
-            D = position.astype(float) - point[:, None]
+            D = np.clip(position.astype(float) - point[:, None], -2.0 ** 60, 2.0 ** 60)
             weight += basis(*(D / np.sqrt((D * D).sum(0) + head.softening ** 2)))[:n]
         weight /= 0.28209479 * len(head.points)
         for k in range(3):
@@ -841,7 +834,8 @@ def values_of(head, out, there):
             dc[k] -= (weight * mine).sum(0)
             summed[k] += 3 * abs(mine).sum(0)
     ideal = {"position": (ideal.T, 2.0 ** -20 * abs(moves).sum(0)[:, None] + 2.0 ** -23 * abs(ideal.T)),
-             "rotation": (rotation.T, np.full((len(lack), 4), 2.0 ** -20)), "dc": (dc.T, 2.0 ** -18 * summed.T + 2.0 ** -22 * abs(head.dc_mean)),
+             "rotation": (rotation.T, np.full((len(lack), 4), 2.0 ** -20)),
+             "dc": (dc.T, 2.0 ** -18 * summed.T + 2.0 ** -22 * abs(head.dc_mean)),
              "opacity": (opacity, 2.0 ** -20 * np.maximum(1, abs(opacity)))}
     result = {"scale": (values[:3] / 2 ** 20).T.astype(F), "sh_rest": rest}
     with np.errstate(over="ignore"):
@@ -859,7 +853,7 @@ def sh_rest(head, out, there):
         who, atom, size = who[sort], atom[sort], size[sort]
         check(not ((np.diff(who) == 0) & (np.diff(atom) == 0)).any(), "a Gaussian has an atom twice")
         count = out.nonzeros.sum(0)
-        check((count <= head.d).all(), "a Gaussian has too many nonzeros")
+        check((count <= head.d).all(), "all parts of a Gaussian together have more than d nonzeros")
         with np.errstate(over="ignore"):
             steps = np.array([F(head.value_step) * (F(1) if head.promised else F(2) ** c) for c in range(16)], F)
             value = (size.astype(F) * steps[out.colour[who]]).astype(np.float16).astype(F)
@@ -894,7 +888,7 @@ def basis(x, y, z):
 def read_column(data, n):
     b = Bytes(data)
     kind = b.u8()
-    check(kind < 8, "a column is of an unknown type")
+    check(kind < 8, "the type of a column is not from 0 to 7")
     kind = np.dtype(COLUMN_TYPES[kind])
     values = []
     for first in range(0, n, 65536):
@@ -909,10 +903,10 @@ def read_block(b, n, w):
         values = np.full(n, int.from_bytes(b.take(w), "little"), "<u8")
     elif how == 4:
         size = b.unpack("H")[0] + 1
-        check(size <= n, "a palette is too large")
+        check(size <= n, "C of a palette is above n")
         palette = numbers(b, b.u8(), size, w)
         places = numbers(b, b.u8(), n, 1 if size <= 256 else 2)
-        check((places < size).all(), "a place of a palette is out of range")
+        check((places < size).all(), "a place of a palette is not below C")
         values = palette[places.astype(I)]
     else:
         values = numbers(b, how, n, w)
@@ -921,7 +915,7 @@ def read_block(b, n, w):
 
 
 def numbers(b, how, c, w):
-    check(1 <= how <= 3, "unknown numbers in a column")
+    check(1 <= how <= 3, "a filter of a column is not from 0 to 4, or that of numbers not from 1 to 3")
     if how == 1:
         return np.frombuffer(stream(b, c * w), f"<u{w}").astype("<u8")
     x = np.zeros(c, "<u8")

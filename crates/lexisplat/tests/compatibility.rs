@@ -389,6 +389,8 @@ fn properties_that_no_ply_could_hold_are_damage() {
             "extra.\u{a0}",
             "extra.x",
             "extra.f_rest_7",
+            "extra.f_rest_07",
+            "extra.f_rest_99999999999999999999",
             "extra.rot_3",
         ] {
             for said in scene_refusals(&with(tensor)) {
@@ -398,7 +400,7 @@ fn properties_that_no_ply_could_hold_are_damage() {
         }
         // Columns of packed files are coded.
         let column = parts.tensors.iter().find(|tensor| tensor.0 == "extra.label").map(|tensor| &tensor.3);
-        for tensor in ["extra.mine", "extra.f_rest_07", "extra.nx", "extra.größe"] {
+        for tensor in ["extra.mine", "extra.f_rest_", "extra.f_rest_x7", "extra.nx", "extra.größe"] {
             let file = match column {
                 Some(column) if is_packed(name) => parts.and(tensor, "U8", &[column.len()], column).sealed(),
                 _ if is_packed(name) => continue,

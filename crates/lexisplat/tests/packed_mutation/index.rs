@@ -75,7 +75,7 @@ pub(crate) struct Index {
     dictionary: std::ops::Range<usize>,
     /// All numbers of 7 bits a byte of the head.
     pub(crate) numbers: Vec<Number>,
-    is_sorted: bool,
+    pub(crate) is_sorted: bool,
     levels: Vec<u8>,
     chunks: Vec<Chunk>,
     ranges: Vec<Range>,

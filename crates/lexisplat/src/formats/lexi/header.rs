@@ -54,6 +54,9 @@ pub(super) struct Header {
 impl Header {
     /// Reads the JSON `text`. The error says what is wrong with it.
     pub(super) fn read(text: &[u8]) -> Result<Self, String> {
+        if text.first() != Some(&b'{') {
+            return Err(invalid("byte 8 is not '{'"));
+        }
         let Json::Object(members) = Json::parse(text).map_err(|e| format!("the header: {e}"))? else {
             return Err(invalid("the header is not an object"));
         };

@@ -69,8 +69,12 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     let gaussians: u64 = checked.number(key::GAUSSIANS)?;
     if checked.is_whole() {
         limits.check_gaussians(&checked.file, gaussians)?;
-        let what = format!("Gaussians in {}, for its {file_bytes} bytes", checked.file);
-        Limits::check(&what, gaussians, file_bytes.saturating_mul(GAUSSIANS_PER_BYTE))?;
+        if gaussians > file_bytes.saturating_mul(GAUSSIANS_PER_BYTE) {
+            let text = format!(
+                "metadata 'gaussians' is {gaussians}, above {GAUSSIANS_PER_BYTE} for each of the file's {file_bytes} bytes"
+            );
+            return Err(checked.malformed(text));
+        }
     }
     let (_, bytes) = checked.sealed_head()?;
     let atoms = atoms_of_head(bytes).ok_or_else(|| checked.malformed("tensor 'packed.head' is too short"))?;

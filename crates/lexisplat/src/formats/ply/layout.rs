@@ -129,9 +129,10 @@ fn refuse_other_kinds(columns: &Columns<'_>) -> Accepted<()> {
 /// Returns the SH degree and the names from `f_rest_0` to the highest.
 fn rest_names(columns: &Columns<'_>) -> Accepted<(ShDegree, Vec<String>)> {
     let number = |name: &str| -> Option<usize> {
-        let digits = name.strip_prefix(REST_PREFIX)?;
-        let number = digits.parse().ok()?;
-        (rest_name(number) == name).then_some(number)
+        let digits = name.strip_prefix(REST_PREFIX).filter(|digits| !digits.is_empty())?;
+        let are_digits = digits.bytes().all(|digit| digit.is_ascii_digit());
+        // A number with too many digits is beyond all that can be there.
+        are_digits.then(|| digits.parse().unwrap_or(usize::MAX))
     };
     let mut numbers: Vec<usize> = columns.fields.keys().filter_map(|name| number(name)).collect();
     numbers.sort_unstable();

@@ -21,8 +21,8 @@ pub(super) const VERTEX: &str = "vertex";
 /// The names of normals are such names, since a scene need not have normals.
 pub(crate) fn is_extra_name(name: &str) -> bool {
     let fixed = [&POSITION[..], &DC, &OPACITY, &SCALE, &ROTATION].concat();
-    let rest = name.strip_prefix(REST_PREFIX).and_then(|digits| digits.parse::<u64>().ok());
-    let is_rest = rest.is_some_and(|number| format!("{REST_PREFIX}{number}") == name);
+    let digits = name.strip_prefix(REST_PREFIX).filter(|digits| !digits.is_empty());
+    let is_rest = digits.is_some_and(|digits| digits.bytes().all(|digit| digit.is_ascii_digit()));
     let is_token = !name.is_empty() && !name.chars().any(|c| c.is_whitespace() || c.is_control());
     is_token && !fixed.contains(&name) && !is_rest
 }

@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde::{Deserialize, Serialize};
 
+use crate::packed::bitstream::broken::{BrokenHead, must};
 use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, Bits, SignedBitModel};
 use crate::scene::sh::{CHANNELS, ShDegree};
 
@@ -76,8 +77,11 @@ impl WholeAtoms {
         Self { numbers, ..self.clone() }
     }
 
-    /// Returns the bytes of the learned atoms.
+    /// Returns the bytes of the learned atoms, none if there are no learned atoms.
     pub(in crate::packed) fn write(&self) -> Vec<u8> {
+        if self.learned() == 0 {
+            return Vec::new();
+        }
         let mut encoder = BitEncoder::default();
         self.code(&mut encoder, self.learned());
         encoder.finish()
@@ -97,17 +101,27 @@ impl WholeAtoms {
         self.numbers.len() / self.degree.rest().max(1)
     }
 
-    /// Reads the bytes that [`Self::write`] wrote for `learned` atoms; `None` for all other bytes.
+    /// Reads the bytes that [`Self::write`] wrote for `learned` atoms.
+    ///
+    /// # Errors
+    /// The broken rule for bytes that are not the bits of so many atoms, or not of these alone.
     pub(in crate::packed) fn read(
         bytes: &[u8],
         degree: ShDegree,
         learned: usize,
         with_axes: bool,
-    ) -> Option<Self> {
+    ) -> Result<Self, BrokenHead> {
         let blank = Self { degree, numbers: Vec::new(), with_axes };
-        let read = blank.code(&mut BitDecoder::new(bytes), learned);
-        let within = read.numbers.iter().all(|number| number.abs() <= MOST);
-        (within && read.write() == bytes).then_some(read)
+        if learned == 0 {
+            must(bytes.is_empty(), || format!("the dictionary: {} bytes for no learned atom", bytes.len()))?;
+            return Ok(blank);
+        }
+        let mut decoder = BitDecoder::new(bytes);
+        let read = blank.code(&mut decoder, learned);
+        let beyond = read.numbers.iter().find(|number| number.abs() > MOST);
+        must(beyond.is_none(), || format!("the dictionary: a number is {beyond:?}, above {MOST} in size"))?;
+        decoder.finish("the dictionary")?;
+        Ok(read)
     }
 
     /// Returns the atoms as unit-norm rows, in channel-major order.
@@ -176,8 +190,8 @@ mod tests {
                 .collect();
             let atoms = WholeAtoms::new(degree, &rows, bits, with_axes);
             let bytes = atoms.write();
-            assert_eq!(WholeAtoms::read(&bytes, degree, learned, with_axes), Some(atoms.clone()));
-            assert_eq!(WholeAtoms::read(&[&bytes[..], &[7]].concat(), degree, learned, with_axes), None);
+            assert_eq!(WholeAtoms::read(&bytes, degree, learned, with_axes), Ok(atoms.clone()));
+            assert!(WholeAtoms::read(&[&bytes[..], &[7]].concat(), degree, learned, with_axes).is_err());
             let read = atoms.rows();
             assert_eq!(read.len(), (learned + if with_axes { dim } else { 0 }) * dim);
             for row in read.chunks_exact(dim) {

@@ -1,5 +1,7 @@
 //! Little-endian numbers in a list of bytes.
 
+use super::broken::BrokenHead;
+
 /// A reader that takes numbers from the start of a list of bytes. Every method returns `None` if too few bytes are left.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::packed) struct ByteReader<'a>(pub(in crate::packed) &'a [u8]);
@@ -50,11 +52,9 @@ impl<'a> ByteReader<'a> {
         self.number().and_then(|number| u32::try_from(number).ok())
     }
 
-    /// Takes the `N` high bytes of a finite f32, whose other bytes are 0.
-    pub(in crate::packed) fn short<const N: usize>(&mut self) -> Option<f32> {
-        let mut bytes = [0; 4];
-        bytes.get_mut(4 - N..)?.copy_from_slice(&self.array::<N>()?);
-        Some(f32::from_le_bytes(bytes)).filter(|x| x.is_finite())
+    /// Takes a finite bf16: the two high bytes of an f32, whose other bytes are 0.
+    pub(in crate::packed) fn bf16(&mut self) -> Option<f32> {
+        self.u16().map(|high| f32::from_bits(u32::from(high) << 16)).filter(|x| x.is_finite())
     }
 
     /// Takes a finite f32.
@@ -81,6 +81,24 @@ impl<'a> ByteReader<'a> {
     }
 }
 
+/// A reader that takes the named fields of a head.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::packed) struct Fields<'a>(pub(in crate::packed) ByteReader<'a>);
+
+impl<'a> Fields<'a> {
+    /// Takes a field. An error names the field.
+    pub(in crate::packed) fn take<T>(
+        &mut self,
+        name: &str,
+        take: impl FnOnce(&mut ByteReader<'a>) -> Option<T>,
+    ) -> Result<T, BrokenHead> {
+        let left = self.0.0.len();
+        take(&mut self.0).ok_or_else(|| {
+            BrokenHead(format!("'{name}' is cut off or not a number of its type; {left} bytes were left"))
+        })
+    }
+}
+
 /// Writes an integer in groups of 7 bits, a byte each, low bits first. All bytes but the last have their highest bit set.
 pub(in crate::packed) fn put_number(out: &mut Vec<u8>, mut number: u64) {
     while number >= 0x80 {
@@ -90,17 +108,9 @@ pub(in crate::packed) fn put_number(out: &mut Vec<u8>, mut number: u64) {
     out.push(number.to_le_bytes()[0]);
 }
 
-/// Writes the `N` high bytes of `x`, whose other bytes must be 0; see [`shortened`].
-pub(in crate::packed) fn put_short<const N: usize>(out: &mut Vec<u8>, x: f32) {
-    out.extend(x.to_le_bytes().iter().skip(4 - N));
-}
-
-/// Returns the number nearest to `x` of which all but the `N` high bytes are 0. It is finite if `x` is.
-pub(in crate::packed) fn shortened<const N: usize>(x: f32) -> f32 {
-    let low = u32::BITS - 8 * N as u32;
-    let cut = |bits: u32| f32::from_bits(bits >> low << low);
-    let near = cut(x.to_bits().wrapping_add(1 << (low - 1)));
-    if near.is_finite() { near } else { cut(x.to_bits()) }
+/// Writes `x` as a bf16: its two high bytes. The others must be 0.
+pub(in crate::packed) fn put_bf16(out: &mut Vec<u8>, x: f32) {
+    out.extend(x.to_le_bytes().iter().skip(2));
 }
 
 #[cfg(test)]
@@ -122,14 +132,12 @@ mod tests {
     }
 
     #[test]
-    fn short_numbers_come_back() {
-        for x in [0.0, 1.0, -1.5, 3.25e-3, 1e30, -1e-30, f32::MAX] {
-            let near = shortened::<3>(x);
-            assert!((near - x).abs() <= x.abs() * 1e-4);
+    fn bf16_come_back() {
+        for x in [0.0, 1.0, -1.5, -3.389_531_4e38] {
             let mut out = Vec::new();
-            put_short::<3>(&mut out, near);
-            assert_eq!((out.len(), ByteReader(&out).short::<3>()), (3, Some(near)));
+            put_bf16(&mut out, x);
+            assert_eq!((out.len(), ByteReader(&out).bf16()), (2, Some(x)));
         }
-        assert_eq!(ByteReader(&[0x80, 0x7f]).short::<2>(), None);
+        assert_eq!(ByteReader(&[0x80, 0x7f]).bf16(), None);
     }
 }

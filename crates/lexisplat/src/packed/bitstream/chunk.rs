@@ -6,6 +6,7 @@ use super::integer_model::Steering;
 use super::parameters::CHANGES;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest, RestForm};
+use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::drawn::{Drawn, Frame};
 use crate::packed::bitstream::stream::BitCounts;
@@ -42,7 +43,7 @@ pub(in crate::packed) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<I
 /// A receiver of the decoded Gaussians of a chunk. It is a trait, since closures are not inlined into vector code.
 pub(in crate::packed) trait Sink {
     /// Takes Gaussian `number` of each lane in `set`. It has the index `in_block` in its block. `levels` are the number of
-    /// refinements of the chunk, and of those that are missing. Returns `None` for values that no encoder writes.
+    /// refinements of the chunk, and of those that are missing. Returns the rule that a damaged file breaks.
     fn group(
         &mut self,
         number: usize,
@@ -50,10 +51,10 @@ pub(in crate::packed) trait Sink {
         set: u32,
         group: &Group,
         levels: [usize; 2],
-    ) -> Option<()>;
+    ) -> Result<(), Broken>;
 
     /// Takes the SH-rest of a block of Gaussians. The block begins with Gaussian `number` of each lane.
-    fn rest(&mut self, number: usize, rest: &Rest) -> Option<()>;
+    fn rest(&mut self, number: usize, rest: &Rest) -> Result<(), Broken>;
 }
 
 /// The parameters with which the chunks of a file are coded.
@@ -114,10 +115,10 @@ impl Form {
                 let group: [&CodedGaussian; LANES] = std::array::from_fn(of);
                 let coded = group;
                 let mut group = Group::default();
-                walk.base(base, set, Some(&coded), &mut group)?;
+                walk.base(base, set, Some(&coded), &mut group).ok()?;
                 sums[0].base(set, &group);
                 for (k, range) in finer.iter_mut().enumerate() {
-                    refine(range, set, &mut group, levels - k)?;
+                    refine(range, set, &mut group, levels - k).ok()?;
                     sums[1 + k].refined(set, &group);
                 }
                 if let Some(range) = changed.first_mut() {
@@ -134,7 +135,7 @@ impl Form {
                 there.filter_map(|(i, _)| coded.get(starts[l] + first + i)).collect()
             });
             for (part, range) in parts.iter_mut().enumerate() {
-                rest.part(range, Some(&wanted), &self.rest, part)?;
+                rest.part(range, Some(&wanted), &self.rest, part).ok()?;
                 sums[1 + levels + part].rest(&rest, &self.rest, part);
             }
         }
@@ -145,8 +146,8 @@ impl Form {
     }
 
     /// Decodes a chunk of `gaussians` Gaussians from the ranges that are there, and hands the Gaussians to `sink`.
-    /// Refinements after a missing refinement are ignored, and so are parts after a missing part. `None` if the base is
-    /// missing or the ranges are not the output of an encoder.
+    /// Refinements after a missing refinement are ignored, and so are parts after a missing part. Returns the rule that a
+    /// damaged file breaks, and the number of the range that breaks it.
     #[inline(always)]
     pub(in crate::packed) fn decode(
         &self,
@@ -156,24 +157,22 @@ impl Form {
         ranges: &[Option<&[u8]>],
         want: Want,
         sink: &mut impl Sink,
-    ) -> Option<Played> {
+    ) -> Result<Played, InRange> {
         let levels = layer.levels;
         let lanes = lanes(gaussians);
         let of = |k: usize| ranges.get(k).copied().flatten();
-        let mut base = SymbolDecoder::new(lookup, of(0)?, lanes, want.bits)?;
-        let mut finer = Vec::new();
-        for bytes in (0..levels).map_while(|k| of(1 + k)) {
-            finer.push(SymbolDecoder::new(lookup, bytes, lanes, want.bits)?);
-        }
-        let mut parts = Vec::new();
-        for bytes in (0..layer.parts).map_while(|k| of(1 + levels + k)) {
-            parts.push(SymbolDecoder::new(lookup, bytes, lanes, want.bits)?);
-        }
-        let changed = of(layer.interim_range()).filter(|_| layer.interim);
-        let mut changed = match changed {
-            Some(bytes) => Some(SymbolDecoder::new(lookup, bytes, lanes, want.bits)?),
-            None => None,
+        let decoder = |k: usize| match of(k) {
+            Some(bytes) => SymbolDecoder::new(lookup, bytes, lanes, want.bits).map(Some).map_err(in_range(k)),
+            None => Ok(None),
         };
+        let first_part = 1 + levels;
+        let mut base = decoder(0)?.ok_or_else(|| in_range(0)(Broken("is missing")))?;
+        let all = |kinds: std::ops::Range<usize>| -> Result<Vec<_>, InRange> {
+            kinds.map(decoder).map_while(Result::transpose).collect()
+        };
+        let mut finer: Vec<SymbolDecoder<'_>> = all(1..first_part)?;
+        let mut parts: Vec<SymbolDecoder<'_>> = all(first_part..first_part + layer.parts)?;
+        let mut changed = if layer.interim { decoder(layer.interim_range())? } else { None };
         let missing = levels - finer.len();
         let steps = gaussians.div_ceil(lanes);
         let mut sums = vec![Sums::default(); if want.sums { layer.ranges() } else { 0 }];
@@ -181,12 +180,12 @@ impl Form {
         // A group is large, so one is reused for all steps.
         let mut group = Group::default();
         for (step, set) in sets(gaussians, lanes).enumerate() {
-            walk.base(&mut base, set, None, &mut group)?;
+            walk.base(&mut base, set, None, &mut group).map_err(in_range(0))?;
             if want.sums {
                 sums[0].base(set, &group);
             }
             for (k, range) in finer.iter_mut().enumerate() {
-                refine(range, set, &mut group, levels - k)?;
+                refine(range, set, &mut group, levels - k).map_err(in_range(1 + k))?;
                 if want.sums {
                     sums[1 + k].refined(set, &group);
                 }
@@ -197,32 +196,55 @@ impl Form {
                     sums[layer.interim_range()].interim(set, &group);
                 }
             }
-            sink.group(step, rest.len(), set, &group, [levels, missing])?;
+            sink.group(step, rest.len(), set, &group, [levels, missing]).map_err(in_range(0))?;
             rest.push(set, group.colour);
             if rest.len() == BLOCK || step + 1 == steps {
                 for (part, range) in parts.iter_mut().enumerate() {
-                    rest.part(range, None, &self.rest, part)?;
+                    rest.part(range, None, &self.rest, part).map_err(in_range(first_part + part))?;
                     if want.sums {
                         sums[1 + levels + part].rest(&rest, &self.rest, part);
                     }
                 }
                 // Symbols of damaged files may take no bytes, so the decoders are checked before anything is made of the
                 // symbols.
-                let all = || std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
-                if !all().all(SymbolDecoder::good) {
-                    return None;
-                }
-                sink.rest(step + 1 - rest.len(), &rest)?;
+                base.check().map_err(in_range(0))?;
+                check_each(&finer, 1, SymbolDecoder::check)?;
+                check_each(&parts, first_part, SymbolDecoder::check)?;
+                check_each(changed.as_slice(), layer.interim_range(), SymbolDecoder::check)?;
+                sink.rest(step + 1 - rest.len(), &rest).map_err(in_range(first_part))?;
                 rest.clear();
             }
         }
-        let all = || std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
+        base.check_end().map_err(in_range(0))?;
+        check_each(&finer, 1, SymbolDecoder::check_end)?;
+        check_each(&parts, first_part, SymbolDecoder::check_end)?;
+        check_each(changed.as_slice(), layer.interim_range(), SymbolDecoder::check_end)?;
+        let all = std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
         let mut bits = BitCounts::default();
-        all().filter_map(|player| player.bit_counts.as_ref()).for_each(|counts| bits.add(counts));
-        all()
-            .all(SymbolDecoder::exhausted)
-            .then(|| Played { sums: sums.into_iter().map(Sums::finish).collect(), bits })
+        all.filter_map(|player| player.bit_counts.as_ref()).for_each(|counts| bits.add(counts));
+        Ok(Played { sums: sums.into_iter().map(Sums::finish).collect(), bits })
     }
+}
+
+/// A broken rule, and the number of the range of the chunk that breaks it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::packed) struct InRange {
+    pub(in crate::packed) range: usize,
+    pub(in crate::packed) broken: Broken,
+}
+
+/// Returns a function that names `range` as the one that breaks a rule.
+fn in_range(range: usize) -> impl Fn(Broken) -> InRange {
+    move |broken| InRange { range, broken }
+}
+
+/// Calls `check` for the decoders of the ranges from `first` on.
+fn check_each<'a>(
+    decoders: &[SymbolDecoder<'a>],
+    first: usize,
+    check: impl Fn(&SymbolDecoder<'a>) -> Result<(), Broken>,
+) -> Result<(), InRange> {
+    decoders.iter().enumerate().try_for_each(|(k, decoder)| check(decoder).map_err(in_range(first + k)))
 }
 
 /// A chunk whose symbols are recorded.
@@ -253,7 +275,7 @@ impl Extent {
                 most[k] = most[k].max(position[l]);
             }
         }
-        drawn.can_be(set).then_some(())
+        drawn.check(set).ok()
     }
 }
 

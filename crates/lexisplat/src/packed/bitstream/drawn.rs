@@ -6,6 +6,7 @@ use super::integer_model::VALUE_BITS;
 use super::levels::{dropped, factor};
 use super::parameters::{DC, KINDS, LAST_CLASS, OPACITY, TARGETS};
 use super::values::{logits, numbers, powers, rotations};
+use crate::packed::bitstream::broken::Broken;
 use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
 use crate::support::maths::Vec3;
 
@@ -108,9 +109,9 @@ impl Drawn {
         }
     }
 
-    /// Returns whether the values of all lanes in `set` are within limits and finite.
+    /// Returns the rule that the values of the lanes in `set` break: they must be within limits and finite.
     #[inline(always)]
-    pub(in crate::packed) fn can_be(&self, set: u32) -> bool {
+    pub(in crate::packed) fn check(&self, set: u32) -> Result<(), Broken> {
         let all = self.position.iter().chain(&self.dc);
         let mut good = self.within;
         for values in all {
@@ -118,6 +119,13 @@ impl Drawn {
                 good[l] &= values[l].is_finite();
             }
         }
-        (0..LANES).all(|l| good[l] || !has(set, l))
+        if (0..LANES).all(|l| good[l] || !has(set, l)) {
+            return Ok(());
+        }
+        let are_within = (0..LANES).all(|l| self.within[l] || !has(set, l));
+        Err(Broken(match are_within {
+            true => "has a position or a base colour that is not finite",
+            false => "has a scale, an opacity or a base colour that is not from -2^27 to below 2^27",
+        }))
     }
 }

@@ -8,6 +8,7 @@ use super::levels::{dropped, factor};
 use super::neighbour_context::{AVERAGED, NeighbourContext};
 use super::streams::Stream;
 use super::values::{MAX_LOG_OPACITY, rotations};
+use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::morton;
 use crate::packed::bitstream::parameters::{CHANGES, DC, LAST_CLASS, OPACITY, TARGETS};
@@ -74,7 +75,7 @@ impl<'a> GeometrySyntax<'a> {
     }
 
     /// Codes the base of the next Gaussian of each lane in `set`, and stores it in `group`, which may hold an earlier
-    /// Gaussian. Returns `None` for impossible values, which only damaged files hold. A decoder passes no Gaussians.
+    /// Gaussian. Returns the rule that a damaged file breaks. A decoder passes no Gaussians.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(in crate::packed) fn base<S: Symbols>(
@@ -83,7 +84,7 @@ impl<'a> GeometrySyntax<'a> {
         set: u32,
         coded: Option<&[&CodedGaussian; LANES]>,
         group: &mut Group,
-    ) -> Option<()> {
+    ) -> Result<(), Broken> {
         let p = self.steering;
         let gaussian = |l: usize| coded.map(|coded| coded[l]);
         let context = each(|l| self.gap_bits[l].min(GAP_CONTEXTS));
@@ -104,7 +105,7 @@ impl<'a> GeometrySyntax<'a> {
             }
         }
         if beyond >> (3 * morton::BITS) != 0 {
-            return None;
+            return Err(Broken("has a cell of 2^63 or above"));
         }
         let known = self.around.is_known();
         let around: [Lanes; AVERAGED] = if known {
@@ -163,7 +164,7 @@ impl<'a> GeometrySyntax<'a> {
             remembered[SHAPE][l] = features[2][l] - features[1][l];
         }
         self.around.push(cell, remembered);
-        Some(())
+        Ok(())
     }
 
     /// Codes the rotation and the position of a Gaussian of each lane.
@@ -226,7 +227,7 @@ fn classes<S: Symbols>(
     known: bool,
     around: &[Lanes; AVERAGED],
     levels: usize,
-) -> Option<[Lanes<u32>; 2]> {
+) -> Result<[Lanes<u32>; 2], Broken> {
     const LAST: i32 = LAST_CLASS as i32;
     let level = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
     let class = |k: usize, l: usize| coded.map_or(0, |coded| u32::from(coded[l].classes[k]));
@@ -251,7 +252,7 @@ fn classes<S: Symbols>(
         shape[l] = nearest[l].wrapping_add(over[l].cast_unsigned());
         beyond |= colour[l] > u32::from(LAST_CLASS) || shape[l] > u32::from(LAST_CLASS);
     }
-    (!beyond).then_some([colour, shape])
+    if beyond { Err(Broken("has a class above 15")) } else { Ok([colour, shape]) }
 }
 
 /// Share of a step by which a difference must exceed the middle between two values to be rounded away from zero. The value

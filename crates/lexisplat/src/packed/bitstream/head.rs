@@ -3,16 +3,16 @@
 
 use super::atoms::WholeAtoms;
 use super::axes::{axes_of, turn_of};
-use super::bytes::{ByteReader, put_number, put_short};
+use super::broken::{BrokenHead, must};
+use super::bytes::{ByteReader, Fields, put_number};
 use super::chunk::Form;
 use super::fill_in::MOST_STEP;
 use super::index::Index;
 use super::integer_model::{Integers, Steering, Step, VALUE_BITS};
-use super::mean_view::{MAX_POINTS, MeanView};
+use super::mean_view::{MeanView, SOFTENINGS};
 use super::parameters::KINDS;
 use super::sh_codes::RestForm;
 use super::streams::REST_PARTS;
-use crate::packed::bitstream::bits::{BitReader, BitWriter};
 use crate::packed::bitstream::drawn::Frame;
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters};
 use crate::support::limits::MAX_ATOMS;
@@ -45,6 +45,8 @@ pub(in crate::packed) struct Head {
     pub(in crate::packed) interim: Option<[u32; KINDS]>,
     pub(in crate::packed) mean_view: MeanView,
     pub(in crate::packed) integers: Integers,
+    /// The turn that makes the axes of base colours.
+    pub(in crate::packed) dc_turn: [i16; 4],
     /// The floats that values are made with. Its steps of SH values, its unit of base colours and its steps of interim
     /// changes follow from the other fields.
     pub(in crate::packed) frame: Frame,
@@ -78,6 +80,7 @@ impl Head {
             dc_exponent,
             rest,
             mean_view,
+            dc_turn: turn_of(&p.dc_axes),
             frame: Frame {
                 origin: p.origin,
                 cell: p.cell,
@@ -142,16 +145,14 @@ impl Head {
         out.extend(
             [&f.origin[..], &[f.cell, step], &f.dc_mean].concat().iter().flat_map(|x| x.to_le_bytes()),
         );
-        out.extend(turn_of(&f.dc_axes).iter().flat_map(|x| x.to_le_bytes()));
+        out.extend(self.dc_turn.iter().flat_map(|x| x.to_le_bytes()));
         let softening = (!points.is_empty()).then_some(&self.mean_view.softening);
-        softening.into_iter().chain(points.as_flattened()).for_each(|&x| put_short::<3>(&mut out, x));
+        out.extend(softening.into_iter().chain(points.as_flattened()).flat_map(|x| x.to_le_bytes()));
         for step in self.integers.steps {
             out.extend(step.mantissa.to_le_bytes());
             out.extend(step.shift.to_le_bytes());
         }
-        let mut bits = BitWriter::default();
-        self.integers.write(&mut bits);
-        for part in [&bits.finish(), &self.tables, &self.dictionary] {
+        for part in [&self.integers.write(), &self.tables, &self.dictionary] {
             put_number(&mut out, part.len() as u64);
             out.extend(part);
         }
@@ -159,67 +160,90 @@ impl Head {
         out
     }
 
-    /// Reads the bytes that [`Self::write`] wrote, for rows of `dim` coefficients; `None` for all other bytes.
-    pub(in crate::packed) fn read(bytes: &[u8], dim: usize) -> Option<Self> {
-        let mut from = ByteReader(bytes);
-        let atoms = from.number32()? as usize;
-        let [flags, exponent] = [from.u8()?, from.u8()?];
+    /// Reads the bytes that [`Self::write`] wrote, for rows of `dim` coefficients.
+    ///
+    /// # Errors
+    /// The broken rule for bytes that break a rule of docs/FORMAT.md, "Head".
+    pub(in crate::packed) fn read(bytes: &[u8], dim: usize) -> Result<Self, BrokenHead> {
+        let mut from = Fields(ByteReader(bytes));
+        let atoms = from.take("m", ByteReader::number32)? as usize;
+        let flags = from.take("flags", ByteReader::u8)?;
+        let exponent = from.take("dc_exponent", ByteReader::u8)?;
         let (dc_exponent, interim) = (exponent & ((1 << EXPONENT_BITS) - 1), exponent >> EXPONENT_BITS == 1);
         let points = usize::from(flags & ((1 << POINTS_BITS) - 1));
         let parts = usize::from(flags >> POINTS_BITS & ((1 << (MARKS - POINTS_BITS)) - 1));
         let (is_promised, with_axes) = (flags >> MARKS & 1 == 1, flags >> (MARKS + 1) == 1);
-        if with_axes && (dim == 0 || atoms < dim) {
-            return None;
+        let (most_atoms, most_parts) = if dim == 0 { (0, 0) } else { (MAX_ATOMS, REST_PARTS) };
+        let least_of = |most: usize| most.min(1);
+        must((least_of(most_atoms)..=most_atoms).contains(&atoms), || {
+            format!("'m' is {atoms}, not from {} to {most_atoms}", least_of(most_atoms))
+        })?;
+        must((least_of(most_parts)..=most_parts).contains(&parts), || {
+            format!("'flags': P is {parts}, not from {} to {most_parts}", least_of(most_parts))
+        })?;
+        must(!with_axes || (dim > 0 && atoms >= dim), || {
+            format!("'flags': 'fixed' needs at least {} atoms, and m is {atoms}", dim.max(1))
+        })?;
+        must(dc_exponent <= MAX_DC_EXPONENT, || {
+            format!("'dc_exponent' is {dc_exponent}, above {MAX_DC_EXPONENT}")
+        })?;
+        let mut least: Vec<u32> = Vec::with_capacity(parts);
+        for _ in 1..parts {
+            least.push(from.take("least", ByteReader::u8)?.into());
         }
-        let atoms_can_be = if dim == 0 { atoms == 0 && parts == 0 } else { (1..=MAX_ATOMS).contains(&atoms) };
-        let parts_can_be = dim == 0 || (1..=REST_PARTS).contains(&parts);
-        let within = dc_exponent <= MAX_DC_EXPONENT && points <= MAX_POINTS;
-        if !(atoms_can_be && parts_can_be && within) {
-            return None;
-        }
-        let mut least: Vec<u32> =
-            from.bytes(parts.saturating_sub(1))?.iter().map(|&least| u32::from(least)).collect();
         least.extend((parts > 0).then_some(1));
-        if !least.is_sorted_by(|a, b| a > b) {
-            return None;
+        must(least.is_sorted_by(|a, b| a > b), || format!("'least' is {least:?}, which does not fall to 1"))?;
+        let interim =
+            if interim {
+                Some(from.take("interim_step", |from| {
+                    Some([from.number32()?, from.number32()?, from.number32()?])
+                })?)
+            } else {
+                None
+            };
+        for step in interim.iter().flatten() {
+            must((1..=MOST_STEP).contains(step), || {
+                format!("'interim_step' has {step}, not from 1 to {MOST_STEP}")
+            })?;
         }
-        let interim = match interim {
-            false => None,
-            true => Some([from.number32()?, from.number32()?, from.number32()?]),
-        };
-        if interim.iter().flatten().any(|step| !(1..=MOST_STEP).contains(step)) {
-            return None;
-        }
-        let (origin, cell, step) = (from.f32s()?, from.f32()?, from.f32()?);
+        let origin = from.take("origin", ByteReader::f32s)?;
+        let cell = from.take("side", ByteReader::f32)?;
+        let step = from.take("value_step", ByteReader::f32)?;
+        must(cell > 0.0, || format!("'side' is {cell}, not above 0"))?;
+        must(step > 0.0, || format!("'value_step' is {step}, not above 0"))?;
         let (value_step, promised) = if is_promised { (0.0, step) } else { (step, 0.0) };
-        let dc_mean = from.f32s()?;
-        let turn: [i16; 4] = from.i16s()?;
-        let dc_axes = axes_of(turn).filter(|axes| turn_of(axes) == turn)?;
+        let dc_mean = from.take("dc_mean", ByteReader::f32s)?;
+        let dc_turn: [i16; 4] = from.take("dc_turn", ByteReader::i16s)?;
+        let dc_axes = axes_of(dc_turn).ok_or_else(|| BrokenHead("'dc_turn' is 0".to_owned()))?;
         let mut mean_view = MeanView::default();
         if points > 0 {
-            mean_view.softening = from.short::<3>()?;
+            mean_view.softening = from.take("softening", ByteReader::f32)?;
+            must(SOFTENINGS.contains(&mean_view.softening), || {
+                format!("'softening' is {}, not from 2^-60 to 2^60", mean_view.softening)
+            })?;
         }
         for _ in 0..points {
-            mean_view.points.push([from.short::<3>()?, from.short::<3>()?, from.short::<3>()?]);
-        }
-        // Directions are divided by the softening where a point has no distance, so it must be above 0.
-        if cell <= 0.0 || step <= 0.0 || (points > 0 && mean_view.softening <= 0.0) {
-            return None;
+            mean_view.points.push(from.take("points", ByteReader::f32s)?);
         }
         let mut integers = Integers::default();
         for step in &mut integers.steps {
-            *step = Step { mantissa: from.u16()?, shift: from.u8()?.cast_signed() };
-            if !Step::SHIFTS.contains(&step.shift) {
-                return None;
-            }
+            let mantissa = from.take("steps", ByteReader::u16)?;
+            *step = Step { mantissa, shift: from.take("steps", ByteReader::u8)?.cast_signed() };
+            must(Step::SHIFTS.contains(&step.shift), || {
+                format!(
+                    "'steps' has the shift {}, not from {} to {}",
+                    step.shift,
+                    Step::SHIFTS.start(),
+                    Step::SHIFTS.end()
+                )
+            })?;
         }
-        let mut part = || {
-            let length = from.number32()? as usize;
-            from.bytes(length)
+        let mut part = |name: &str| {
+            let length = from.take(name, ByteReader::number32)? as usize;
+            from.take(name, |from| from.bytes(length))
         };
-        let mut bits = BitReader::new(part()?);
-        integers.read(&mut bits).filter(|()| bits.exhausted())?;
-        let (tables, dictionary) = (part()?.to_vec(), part()?.to_vec());
+        integers.read(part("integers")?)?;
+        let (tables, dictionary) = (part("tables")?.to_vec(), part("dictionary")?.to_vec());
         let mut head = Self {
             with_axes,
             dc_exponent,
@@ -227,6 +251,7 @@ impl Head {
             interim,
             mean_view,
             integers,
+            dc_turn,
             frame: Frame { origin, cell, dc_mean, dc_axes, ..Frame::default() },
             value_step,
             promised,
@@ -236,6 +261,8 @@ impl Head {
         };
         head.index = Index::read(&mut from, head.rest.least.len(), interim.is_some())?;
         head.complete();
-        from.0.is_empty().then_some(head)
+        let left = from.0.0.len();
+        must(left == 0, || format!("{left} bytes follow the index"))?;
+        Ok(head)
     }
 }

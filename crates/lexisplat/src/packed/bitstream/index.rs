@@ -1,6 +1,7 @@
 //! The index of a file: its layers, their chunks, and the ranges of all chunks in the order of the data.
 
-use super::bytes::{ByteReader, put_number, put_short};
+use super::broken::{BrokenHead, must};
+use super::bytes::{ByteReader, Fields, put_bf16, put_number};
 use super::chunk::LayerForm;
 use super::levels::MAX_LEVELS;
 
@@ -176,7 +177,7 @@ impl Index {
             put_number(out, chunk.gaussians as u64);
             put_number(out, chunk.cell);
             if self.chunks.len() > 1 {
-                chunk.bounds.as_flattened().iter().for_each(|&x| put_short::<2>(out, x));
+                chunk.bounds.as_flattened().iter().for_each(|&x| put_bf16(out, x));
             }
         }
         for place in &self.order {
@@ -192,77 +193,101 @@ impl Index {
         }
     }
 
-    /// Reads the bytes that [`Self::write`] wrote for chunks with `parts` parts of SH-rest; `None` for all other bytes. All
-    /// layers but the last have interim changes if `interim` is true.
-    pub(in crate::packed) fn read(from: &mut ByteReader<'_>, parts: usize, interim: bool) -> Option<Self> {
-        let layers = from.u8()?;
+    /// Reads the bytes that [`Self::write`] wrote for chunks with `parts` parts of SH-rest. All layers but the last have
+    /// interim changes if `interim` is true.
+    ///
+    /// # Errors
+    /// The broken rule for bytes that break a rule of docs/FORMAT.md, "Index".
+    pub(in crate::packed) fn read(
+        from: &mut Fields<'_>,
+        parts: usize,
+        interim: bool,
+    ) -> Result<Self, BrokenHead> {
+        let layers = from.take("number of layers", ByteReader::u8)?;
         let (is_sorted, layers) =
             (layers >> LAYERS_BITS == 1, usize::from(layers & ((1 << LAYERS_BITS) - 1)));
-        let levels = from.bytes(layers)?;
-        if layers > MAX_LAYERS || levels.iter().any(|&levels| usize::from(levels) > MAX_LEVELS) {
-            return None;
+        must(layers <= MAX_LAYERS, || format!("the number of layers is {layers}, above {MAX_LAYERS}"))?;
+        let levels = from.take("R", |from| from.bytes(layers))?;
+        for (layer, &levels) in levels.iter().enumerate() {
+            must(usize::from(levels) <= MAX_LEVELS, || {
+                format!("R of layer {layer} is {levels}, above {MAX_LEVELS}")
+            })?;
         }
         let mut index = Self { layers: layer_forms(levels, parts, interim), ..Self::default() };
         let (mut ranges, mut last) = (0, 0);
         // Every chunk and every range takes bytes of the index, so their numbers are bounded by its length.
-        let chunks = from.number32()?;
-        for _ in 0..chunks {
-            let (layer, gaussians) = (usize::from(from.u8()?), from.number32()? as usize);
-            let cell = from.number()?;
+        let chunks = from.take("number of chunks", ByteReader::number32)?;
+        for c in 0..chunks {
+            let layer = usize::from(from.take("layer of a chunk", ByteReader::u8)?);
+            let gaussians = from.take("Gaussians of a chunk", ByteReader::number32)? as usize;
+            let cell = from.take("cell of a chunk", ByteReader::number)?;
             let mut bounds = [[0.0; 3]; 2];
             if chunks > 1 {
                 for bound in bounds.as_flattened_mut() {
-                    *bound = from.short::<2>()?;
+                    *bound = from.take("bounds of a chunk", ByteReader::bf16)?;
                 }
             }
-            let form = *index.layers.get(layer)?;
+            must(layer < layers && layer >= last, || {
+                format!("chunk {c} is of layer {layer}, after one of layer {last}, of {layers}")
+            })?;
+            must((1..=MAX_CHUNK).contains(&gaussians), || {
+                format!("chunk {c} has {gaussians} Gaussians, not from 1 to {MAX_CHUNK}")
+            })?;
             // Within a layer the first cells of chunks do not fall, so that chunks do not overlap.
             let falls = index.chunks.last().is_some_and(|before| before.layer == layer && before.cell > cell);
-            if !(1..=MAX_CHUNK).contains(&gaussians) || layer < last || falls {
-                return None;
-            }
-            let blank = vec![Range::default(); form.ranges()];
+            must(!falls, || format!("chunk {c} has a cell below that of the chunk before"))?;
+            let blank = vec![Range::default(); index.layer(layer).ranges()];
             (ranges, last) = (ranges + blank.len(), layer);
             index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges: blank });
         }
         let mut seen = vec![0_u32; index.chunks.len()];
         // The place of the next range, for ranges that are sorted.
         let mut next = Place { chunk: 0, kind: 0 };
-        for _ in 0..ranges {
+        for number in 0..ranges {
             let place = match is_sorted {
                 true => next,
-                false => Place { chunk: from.number32()?, kind: from.u8()? },
+                false => Place {
+                    chunk: from.take("chunk of a range", ByteReader::number32)?,
+                    kind: from.take("kind of a range", ByteReader::u8)?,
+                },
             };
-            let (length, checksum, integers) = (from.number32()?, from.u32()?, from.u32()?);
-            let last = index.chunks.get(place.chunk as usize)?.ranges.len() - 1;
-            next = match usize::from(place.kind) < last {
+            let length = from.take("bytes of a range", ByteReader::number32)?;
+            let checksum = from.take("CRC-32 of a range", ByteReader::u32)?;
+            let integers = from.take("CRC-32 of the integers of a range", ByteReader::u32)?;
+            let Place { chunk: c, kind } = place;
+            let (chunk, kind) = (c as usize, usize::from(kind));
+            let kinds = index.chunks.get(chunk).map_or(0, |chunk| chunk.ranges.len());
+            let range = index.chunks.get_mut(chunk).and_then(|chunk| chunk.ranges.get_mut(kind));
+            let Some((range, seen)) = range.zip(seen.get_mut(chunk)) else {
+                return Err(BrokenHead(format!(
+                    "range {number} is of kind {kind} of chunk {chunk}, which is not there"
+                )));
+            };
+            *range = Range { start: 0, length, checksum, integers };
+            let bit = 1 << kind;
+            must(*seen & bit == 0, || {
+                format!("range {number} of chunk {chunk}, of kind {kind}, is listed twice")
+            })?;
+            must((*seen | bit) & 1 == 1, || {
+                format!("range {number} of chunk {chunk} comes before its base")
+            })?;
+            *seen |= bit;
+            index.order.push(place);
+            next = match kind + 1 < kinds {
                 true => Place { kind: place.kind + 1, ..place },
                 false => Place { chunk: place.chunk + 1, kind: 0 },
             };
-            let range =
-                index.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
-            *range = Range { start: 0, length, checksum, integers };
-            // Each range occurs once, and the base of a chunk comes before its other ranges.
-            let seen = seen.get_mut(place.chunk as usize)?;
-            let bit = 1 << place.kind;
-            if *seen & bit != 0 || (*seen | bit) & 1 == 0 {
-                return None;
-            }
-            *seen |= bit;
-            index.order.push(place);
         }
-        for chunk in &index.chunks {
-            let bits = u64::from(chunk.ranges.first()?.length) * 8;
-            if chunk.gaussians as u64 * LEAST_BITS > bits {
-                return None;
-            }
+        for (c, chunk) in index.chunks.iter().enumerate() {
+            let bytes = chunk.ranges.first().map_or(0, |base| base.length);
+            must(chunk.gaussians as u64 * LEAST_BITS <= u64::from(bytes) * 8, || {
+                format!("the base of chunk {c} has {bytes} bytes, too few for {} Gaussians", chunk.gaussians)
+            })?;
         }
-        if index.is_sorted() != is_sorted {
-            return None;
-        }
-        let bounds: Vec<[[f32; 3]; 2]> = index.chunks.iter().map(|chunk| chunk.bounds).collect();
-        index.place()?;
-        Some(index).filter(|index| index.chunks.iter().map(|chunk| chunk.bounds).eq(bounds))
+        index
+            .place()
+            .ok_or_else(|| BrokenHead("the Gaussians or the bytes are too many to count".to_owned()))?;
+        Ok(index)
     }
 }
 
@@ -307,8 +332,8 @@ mod tests {
             let mut out = Vec::new();
             index.write(&mut out);
             assert_eq!(out.len(), bytes);
-            assert_eq!(Index::read(&mut ByteReader(&out), 1, false), Some(index));
-            assert_eq!(Index::read(&mut ByteReader(&out[..bytes - 1]), 1, false), None);
+            assert_eq!(Index::read(&mut Fields(ByteReader(&out)), 1, false), Ok(index));
+            assert!(Index::read(&mut Fields(ByteReader(&out[..bytes - 1])), 1, false).is_err());
         }
     }
 

@@ -3,8 +3,9 @@
 //! Integers of 32 bits hold them. Whatever a file holds, no product and no sum of them leaves the range of an `i32`, so
 //! every language computes the same ones. Floats are only used to make values of decoded integers.
 
-use crate::packed::bitstream::bits::{BitReader, BitWriter};
+use crate::packed::bitstream::broken::BrokenHead;
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, TARGETS};
+use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, Bits, SignedBitModel};
 use crate::packed::entropy::lanes::{LANES, Lanes, each};
 
 /// Fraction bits of values. Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
@@ -165,11 +166,8 @@ impl Integers {
     }
 }
 
-/// Number of bits of the width of a group of numbers.
-const WIDTH_BITS: u32 = 5;
-
 impl Integers {
-    /// Returns the groups of numbers that are written with one width, and for each the number of low bits that are 0.
+    /// Returns the groups of numbers that share adaptive probabilities, and for each the number of low bits that are 0.
     fn groups(&mut self) -> Vec<(Vec<&mut i16>, u32)> {
         let mut groups = vec![(vec![&mut self.cell], CONSTANT_ZEROS)];
         for rows in [&mut self.turns, &mut self.moves] {
@@ -194,44 +192,36 @@ impl Integers {
         groups
     }
 
-    /// Writes all integers but the steps.
-    pub(in crate::packed) fn write(&self, out: &mut BitWriter) {
-        for (group, zeros) in self.clone().groups() {
-            let numbers: Vec<i16> = group.into_iter().map(|number| *number >> zeros).collect();
-            let width = numbers.iter().copied().map(width).max().unwrap_or(0);
-            out.put(WIDTH_BITS, width.into());
-            for number in numbers {
-                out.put(width, u64::from(number.cast_unsigned()) & ((1 << width) - 1));
-            }
-        }
-    }
-
-    /// Reads the integers that [`Self::write`] wrote; `None` for all other bits.
-    pub(in crate::packed) fn read(&mut self, from: &mut BitReader<'_>) -> Option<()> {
+    /// Codes all integers but the steps. A decoder gets the decoded ones in place of its own.
+    fn code(&mut self, bits: &mut dyn Bits) -> Result<(), BrokenHead> {
         for (group, zeros) in self.groups() {
-            let most = from.take(WIDTH_BITS) as u32;
-            if most + zeros > i16::BITS {
-                return None;
-            }
-            let mut used = 0;
+            let mut odds = SignedBitModel::default();
             for number in group {
-                let unused = i16::BITS - most;
-                let bits = (from.take(most) as u16).checked_shl(unused).unwrap_or(0);
-                let read = bits.cast_signed().checked_shr(unused).unwrap_or(0);
-                used = used.max(width(read));
-                *number = read << zeros;
-            }
-            if used != most {
-                return None;
+                let coded = bits.signed(&mut odds, i32::from(*number >> zeros)) << zeros;
+                *number = i16::try_from(coded)
+                    .map_err(|_| BrokenHead(format!("the integers: {coded} is not from -32768 to 32767")))?;
             }
         }
-        Some(())
+        Ok(())
     }
-}
 
-/// Returns the number of bits of a number and its sign; 0 for 0.
-fn width(number: i16) -> u32 {
-    if number == 0 { 0 } else { i16::BITS + 1 - (number ^ (number >> 15)).leading_zeros() }
+    /// Returns the bytes of all integers but the steps.
+    pub(in crate::packed) fn write(&self) -> Vec<u8> {
+        let mut encoder = BitEncoder::default();
+        // An encoder returns the integers that it is given.
+        let _ = self.clone().code(&mut encoder);
+        encoder.finish()
+    }
+
+    /// Reads the bytes that [`Self::write`] wrote.
+    ///
+    /// # Errors
+    /// The broken rule for all other bytes.
+    pub(in crate::packed) fn read(&mut self, bytes: &[u8]) -> Result<(), BrokenHead> {
+        let mut decoder = BitDecoder::new(bytes);
+        self.code(&mut decoder)?;
+        decoder.finish("the integers")
+    }
 }
 
 /// The integers of a file's parameters, prepared for the walk over a chunk.

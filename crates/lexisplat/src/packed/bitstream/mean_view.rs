@@ -4,7 +4,6 @@
 //! few directions, so a file holds the average colour from a few points of view. The decoder subtracts what the SH-rest
 //! that is there adds to that average. So a Gaussian has its best colour with and without its SH-rest.
 
-use super::bytes::shortened;
 use super::halves::doubled;
 use crate::packed::bitstream::sh_codes::Nonzero;
 use crate::packed::entropy::lanes::{LANES, Lanes};
@@ -29,8 +28,19 @@ pub(in crate::packed) struct MeanView {
 
 /// Softening as a share of the median distance of the points from their mean.
 const SOFTENING: f32 = 0.02;
-/// Least softening. Its square is a normal number.
+/// Least softening that an encoder chooses.
 const LEAST_SOFTENING: f32 = 1e-15;
+/// Largest difference of a coordinate of a position and of a point that counts, 2^60. Sums of its squares are finite.
+const MOST_DIFFERENCE: f32 = f32::from_bits((127 + 60) << 23);
+/// Range of the softening of a file, 2^-60 to 2^60. Its square is a normal number.
+pub(in crate::packed) const SOFTENINGS: std::ops::RangeInclusive<f32> =
+    f32::from_bits((127 - 60) << 23)..=MOST_DIFFERENCE;
+
+/// Returns the difference of a coordinate of a position and of a point, limited to [`MOST_DIFFERENCE`].
+#[inline(always)]
+fn difference(position: f32, point: f32) -> f32 {
+    (position - point).clamp(-MOST_DIFFERENCE, MOST_DIFFERENCE)
+}
 
 impl MeanView {
     /// Creates a view from the first [`MAX_POINTS`] of `points`.
@@ -38,15 +48,14 @@ impl MeanView {
         if points.is_empty() {
             return Self::default();
         }
-        let points: Vec<Vec3> =
-            points.iter().take(MAX_POINTS).map(|point| point.map(shortened::<3>)).collect();
+        let points: Vec<Vec3> = points.iter().take(MAX_POINTS).copied().collect();
         let middle: Vec3 =
             std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f32>() / points.len() as f32);
         let far = |p: &Vec3| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f32>().sqrt();
         let mut distances: Vec<f32> = points.iter().map(far).collect();
         distances.sort_by(f32::total_cmp);
-        let softening = shortened::<3>(SOFTENING * at_share(&distances, 0.5));
-        Self { softening: softening.max(shortened::<3>(LEAST_SOFTENING)), points }
+        let softening = SOFTENING * at_share(&distances, 0.5);
+        Self { softening: softening.clamp(LEAST_SOFTENING, *SOFTENINGS.end()), points }
     }
 
     /// Returns the average of each basis function over the directions from all points to `position`, divided by the basis
@@ -55,7 +64,7 @@ impl MeanView {
     pub(in crate::packed) fn weights(&self, degree: ShDegree, position: Vec3) -> [f32; MOST] {
         let mut sums = [0.0; MOST];
         for point in &self.points {
-            let (x, y, z) = (position[0] - point[0], position[1] - point[1], position[2] - point[2]);
+            let [x, y, z]: Vec3 = std::array::from_fn(|k| difference(position[k], point[k]));
             let scale = 1.0 / (x * x + y * y + z * z + self.softening * self.softening).sqrt();
             let basis = rest_basis(degree, [x * scale, y * scale, z * scale]);
             for (sum, b) in sums.iter_mut().zip(basis) {
@@ -115,8 +124,7 @@ impl MeanView {
         let softening = self.softening * self.softening;
         for point in &self.points {
             for l in 0..LANES {
-                let (x, y, z) =
-                    (positions[0][l] - point[0], positions[1][l] - point[1], positions[2][l] - point[2]);
+                let [x, y, z]: Vec3 = std::array::from_fn(|k| difference(positions[k][l], point[k]));
                 let scale = 1.0 / (x * x + y * y + z * z + softening).sqrt();
                 let basis = rest_basis(degree, [x * scale, y * scale, z * scale]);
                 for k in 0..PER_CHANNEL {
@@ -219,6 +227,37 @@ mod tests {
             }
         }
         assert_eq!(MeanView::new(&[]), MeanView::default());
+    }
+
+    /// Coordinates of any size give the weights of directions in f64, with differences limited to 2^60.
+    #[test]
+    fn weights_of_extreme_points_are_those_of_f64() {
+        let degree = ShDegree::new(2).unwrap();
+        let points = [[1e19, 0.0, 1e18], [-3e19, 1e19, 0.0], [0.0, f32::MAX, -1e30], [0.0, 0.0, 1e-20]];
+        for point in points {
+            for position in [[0.0; 3], [1e18, -2e18, 5e17], [f32::MAX, f32::MIN, 1.0], [3e19, 1e19, -1e19]] {
+                let view = MeanView { points: vec![point], softening: *SOFTENINGS.start() };
+                let limit = f64::from(MOST_DIFFERENCE);
+                let d: [f64; 3] = std::array::from_fn(|k| {
+                    (f64::from(position[k]) - f64::from(point[k])).clamp(-limit, limit)
+                });
+                let squares = d.iter().map(|x| x * x).sum::<f64>() + f64::from(*SOFTENINGS.start()).powi(2);
+                let [x, y, z] = d.map(|x| x / squares.sqrt());
+                // Degree 1, and two of degree 2, in docs/FORMAT.md.
+                let wanted = [
+                    (0, -0.488_602_51 * y),
+                    (1, 0.488_602_51 * z),
+                    (2, -0.488_602_51 * x),
+                    (3, 1.092_548_4 * x * y),
+                    (5, 0.315_391_57 * (2.0 * z * z - x * x - y * y)),
+                ];
+                let found = view.weights(degree, position);
+                for (k, b) in wanted {
+                    let off = f64::from(found[k]) - b / f64::from(C0);
+                    assert!(off.abs() < 1e-5, "{point:?} {position:?} {k}: {off}");
+                }
+            }
+        }
     }
 
     /// The weights of a far point are the basis functions in its direction.

@@ -12,7 +12,7 @@
 
 pub(in crate::packed) mod atoms;
 pub(in crate::packed) mod axes;
-pub(in crate::packed) mod bits;
+pub(in crate::packed) mod broken;
 pub(in crate::packed) mod bytes;
 pub(in crate::packed) mod chunk;
 pub(in crate::packed) mod coded_gaussian;

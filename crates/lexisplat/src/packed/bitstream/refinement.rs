@@ -4,6 +4,7 @@ use super::geometry_syntax::{Group, REFINED, coarsened};
 use super::levels::{FACTOR, dropped, factor};
 use super::parameters::DC;
 use super::streams::Stream;
+use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::parameters::TARGETS;
 use crate::packed::entropy::lanes::{LANES, Lanes, each};
 use crate::packed::entropy::shifts::power;
@@ -17,7 +18,7 @@ const CLASSES: u32 = 8;
 const CLASS_WIDTH: u32 = 2;
 const FINENESS_WIDTH: u32 = 3;
 
-/// Codes the refinement of a group from `level` missing refinements to one fewer. Returns `None` for impossible values.
+/// Codes the refinement of a group from `level` missing refinements to one fewer. Returns the rule that a damaged file breaks.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(in crate::packed) fn refine<S: Symbols>(
@@ -25,7 +26,7 @@ pub(in crate::packed) fn refine<S: Symbols>(
     set: u32,
     group: &mut Group,
     level: usize,
-) -> Option<()> {
+) -> Result<(), Broken> {
     let mut beyond = false;
     let finer = factor(level - 1);
     for k in DC..REFINED {
@@ -64,7 +65,7 @@ pub(in crate::packed) fn refine<S: Symbols>(
             group.rotation[k][l] = group.rotation[k][l].wrapping_mul(power(count[l])) | low[l];
         }
     }
-    (!beyond).then_some(())
+    if beyond { Err(Broken("has a finer step above 2")) } else { Ok(()) }
 }
 
 #[cfg(test)]
@@ -139,7 +140,7 @@ mod tests {
             let blank = group(levels, &wanted, &codes);
             let (mut recorder, mut coded) = (SymbolRecorder::default(), blank.clone());
             for level in (1..=levels).rev() {
-                refine(&mut recorder, set, &mut coded, level);
+                refine(&mut recorder, set, &mut coded, level).unwrap();
                 assert_refined(&coded, &blank, set, level - 1);
             }
             recorder.each(|_, symbol| assert!(symbol <= 2), |_, _| ());
@@ -149,10 +150,10 @@ mod tests {
             let zeros = [0; LANES];
             let mut decoded = Group { wanted: [zeros; REFINED], wanted_rotation: [[0; LANES]; 3], ..blank.clone() };
             for level in (1..=levels).rev() {
-                refine(&mut player, set, &mut decoded, level);
+                refine(&mut player, set, &mut decoded, level).unwrap();
                 assert_refined(&decoded, &blank, set, level - 1);
             }
-            prop_assert!(player.exhausted());
+            prop_assert_eq!(player.check_end(), Ok(()));
         }
     }
 }

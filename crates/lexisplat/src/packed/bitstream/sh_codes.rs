@@ -3,6 +3,7 @@
 use half::f16;
 
 use super::streams::{REST_PARTS, Stream};
+use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::entropy::lanes::{LANES, Lanes, each};
 use crate::packed::entropy::symbols::Symbols;
@@ -171,7 +172,7 @@ impl Rest {
     }
 
     /// Codes one part of the nonzeros of the block. `coded` holds the Gaussians of each lane; a decoder passes none.
-    /// Returns `None` for impossible values.
+    /// Returns the rule that a damaged file breaks.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(in crate::packed) fn part<S: Symbols>(
@@ -180,8 +181,8 @@ impl Rest {
         coded: Option<&Lanes<Vec<&CodedGaussian>>>,
         form: &RestForm,
         part: usize,
-    ) -> Option<()> {
-        let least = *form.least.get(part)?;
+    ) -> Result<(), Broken> {
+        let Some(&least) = form.least.get(part) else { return Ok(()) };
         let most =
             part.checked_sub(1).and_then(|before| form.least.get(before)).map_or(MAX_SIZE, |&most| most);
         // The nonzeros of each lane that belong to this part.
@@ -199,7 +200,7 @@ impl Rest {
         let pages = form.atoms as u32 > PAGE;
         let of = |l: usize, j: usize| wanted[l].get(j).copied().unwrap_or_default();
         let mut last = [0; LANES];
-        let mut beyond = false;
+        let (mut no_atom, mut no_size) = (false, false);
         for j in 0..count {
             let set = longer(&totals, j);
             let plan = self.plan[j];
@@ -222,13 +223,17 @@ impl Rest {
             last = size;
             let atom = each(|l| PAGE * page[l] + atom[l]);
             for l in 0..LANES {
-                beyond |= atom[l] >= form.atoms as u32 || size[l] >= most - least;
+                no_atom |= atom[l] >= form.atoms as u32;
+                no_size |= size[l] >= most - least;
             }
             self.parts[part].atoms.push(atom);
             self.parts[part].values.push(each(|l| size[l].wrapping_add(least).cast_signed()));
         }
-        if beyond {
-            return None;
+        if no_atom {
+            return Err(Broken("has an atom that the dictionary does not have"));
+        }
+        if no_size {
+            return Err(Broken("has a nonzero whose size is not within its part"));
         }
         for from in (0..count).step_by(SIGNS) {
             let taken = each(|l| (totals[l]).saturating_sub(from as u32).min(SIGNS as u32));
@@ -242,7 +247,7 @@ impl Rest {
                 }
             }
         }
-        if part == 0 { self.exact(s, coded, form) } else { Some(()) }
+        if part == 0 { self.exact(s, coded, form) } else { Ok(()) }
     }
 
     /// Codes the numbers of nonzeros of one part.
@@ -255,7 +260,7 @@ impl Rest {
         form: &RestForm,
         part: usize,
         sizes: std::ops::Range<u32>,
-    ) -> Option<()> {
+    ) -> Result<(), Broken> {
         let escape = form.dim as u32 + 1;
         let mut beyond = false;
         for i in 0..self.len() {
@@ -289,7 +294,7 @@ impl Rest {
             }
             self.parts[part].counts.push(counts);
         }
-        (!beyond).then_some(())
+        if beyond { Err(Broken("has a Gaussian with more nonzeros than coefficients")) } else { Ok(()) }
     }
 
     /// Computes the contexts of the nonzeros of a part. Returns the number of nonzeros of each lane.
@@ -324,7 +329,7 @@ impl Rest {
         s: &mut S,
         coded: Option<&Lanes<Vec<&CodedGaussian>>>,
         form: &RestForm,
-    ) -> Option<()> {
+    ) -> Result<(), Broken> {
         let escape = form.dim as u32 + 1;
         let mut finite = true;
         for i in 0..self.len() {
@@ -340,7 +345,7 @@ impl Rest {
                 }
             }
         }
-        finite.then_some(())
+        if finite { Ok(()) } else { Err(Broken("has exact SH-rest that is not finite")) }
     }
 }
 

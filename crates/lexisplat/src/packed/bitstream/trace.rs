@@ -208,7 +208,8 @@ fn trace(name: &str, shown: usize) -> String {
 }
 
 /// The golden files with traces, and the number of their Gaussians that these show.
-const TRACES: [(&str, usize); 3] = [("packed3_degree0", 3), ("packed3_escapes", 3), ("packed3_layers", 3)];
+const TRACES: [(&str, usize); 4] =
+    [("packed3", 3), ("packed3_degree0", 3), ("packed3_escapes", 3), ("packed3_layers", 3)];
 
 fn golden(name: &str) -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "tests", "golden", &format!("{name}.trace")].iter().collect()

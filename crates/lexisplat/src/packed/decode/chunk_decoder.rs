@@ -1,7 +1,8 @@
 //! Decoding of the chunks of a file.
 
 use crate::packed::bitstream::atoms::WholeAtoms;
-use crate::packed::bitstream::chunk::Want;
+use crate::packed::bitstream::broken::{Broken, BrokenHead, must};
+use crate::packed::bitstream::chunk::{InRange, Want};
 use crate::packed::bitstream::head::Head;
 use crate::packed::bitstream::index::{Chunk, Index};
 use crate::packed::bitstream::mean_view::SeenAtoms;
@@ -34,15 +35,16 @@ impl BitstreamDecoder {
     /// Reads the head of a packed scene.
     pub(in crate::packed) fn new(packed: &PackedHead) -> Result<Self> {
         let file = packed.file.clone();
-        let bad = |what: &str| Error::malformed(&file, format!("packed {what}: no encoder writes it"));
-        let head = Head::read(&packed.bytes, packed.degree.rest()).ok_or_else(|| bad("head is damaged"))?;
-        if head.index.gaussians() != packed.gaussians || head.rest.atoms != packed.atoms {
-            return Err(bad("head does not fit the metadata"));
-        }
-        let tables = Tables::read(&head.tables).ok_or_else(|| bad("tables are damaged"))?;
+        let bad = |rule: BrokenHead| Error::malformed(&file, format!("packed.head: {rule}"));
+        let head = Head::read(&packed.bytes, packed.degree.rest()).map_err(bad)?;
+        let gaussians = head.index.gaussians();
+        must(gaussians == packed.gaussians, || {
+            format!("its chunks have {gaussians} Gaussians, and metadata 'gaussians' is {}", packed.gaussians)
+        })
+        .map_err(bad)?;
+        let tables = Tables::read(&head.tables).map_err(bad)?;
         let lookup = Lookup::new(&tables);
-        let (dictionary, dictionary_bits) =
-            dictionary(&head, packed.degree).ok_or_else(|| bad("dictionary is damaged"))?;
+        let (dictionary, dictionary_bits) = dictionary(&head, packed.degree).map_err(bad)?;
         let unpacker = Unpacker {
             seen_atoms: SeenAtoms::new(&head.mean_view, &dictionary),
             form: head.form(),
@@ -101,7 +103,10 @@ impl BitstreamDecoder {
         let want = Want { sums: options.verify, bits: count_bits };
         let piece = self.unpacker.chunk(form, chunk.cell, &alone, &ranges, want, place, budget);
         let (mut piece, sums) = piece.map_err(|refusal| match refusal {
-            Refusal::Damaged => damaged(),
+            Refusal::Damaged(InRange { range, broken: Broken(rule) }) => {
+                let kind = RangeKind::of(form, range);
+                Error::malformed(&self.file, format!("packed.data: {kind} of chunk {c} {rule}"))
+            }
             Refusal::Full => budget.full(),
         })?;
         for (k, (sum, _)) in sums.iter().zip(&ranges).enumerate().filter(|(_, (_, range))| range.is_some()) {
@@ -151,15 +156,17 @@ impl BitstreamDecoder {
     }
 }
 
-fn dictionary(head: &Head, degree: ShDegree) -> Option<(Dictionary, BitCounts)> {
-    if degree.rest() == 0 {
-        return head.dictionary.is_empty().then(|| (Dictionary::empty(), BitCounts::default()));
-    }
-    let learned = head.rest.atoms.checked_sub(if head.with_axes { degree.rest() } else { 0 })?;
+fn dictionary(head: &Head, degree: ShDegree) -> Result<(Dictionary, BitCounts), BrokenHead> {
+    let learned = head.rest.atoms.saturating_sub(if head.with_axes { degree.rest() } else { 0 });
     let atoms = WholeAtoms::read(&head.dictionary, degree, learned, head.with_axes)?;
+    if degree.rest() == 0 {
+        return Ok((Dictionary::empty(), BitCounts::default()));
+    }
     let mut bits = BitCounts::zeros();
     bits.0[Stream::Dictionary as usize] = 8.0 * head.dictionary.len() as f64;
-    Some((Dictionary::decoded(degree, atoms.rows())?, bits))
+    let dictionary = Dictionary::decoded(degree, atoms.rows())
+        .ok_or_else(|| BrokenHead("the dictionary has an atom that is not of norm 1".to_owned()))?;
+    Ok((dictionary, bits))
 }
 
 #[cfg(test)]

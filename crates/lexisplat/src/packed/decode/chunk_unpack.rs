@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use half::f16;
 
-use crate::packed::bitstream::chunk::{Form, LayerForm, Sink, Want, starts};
+use crate::packed::bitstream::broken::Broken;
+use crate::packed::bitstream::chunk::{Form, InRange, LayerForm, Sink, Want, starts};
 use crate::packed::bitstream::drawn::{Drawn, Frame};
 use crate::packed::bitstream::geometry_syntax::Group;
 use crate::packed::bitstream::halves::halved;
@@ -73,8 +74,8 @@ struct Job<'j, 'p, 'r> {
 /// The reason for which a chunk is not decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::packed) enum Refusal {
-    /// The ranges are not the output of an encoder.
-    Damaged,
+    /// A range breaks a rule of the format.
+    Damaged(InRange),
     /// The chunk takes more memory than is left.
     Full,
 }
@@ -101,8 +102,10 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             budget,
             is_full: false,
         };
-        let Some(played) = with.form.decode(layer, n, &with.lookup, ranges, want, &mut out) else {
-            return Err(if out.is_full { Refusal::Full } else { Refusal::Damaged });
+        let played = match with.form.decode(layer, n, &with.lookup, ranges, want, &mut out) {
+            Ok(played) => played,
+            Err(_) if out.is_full => return Err(Refusal::Full),
+            Err(broken) => return Err(Refusal::Damaged(broken)),
         };
         let total = out.nonzeros.iter().map(Vec::len).sum();
         let (mut atoms, mut values) = (Vec::with_capacity(total), Vec::with_capacity(total));
@@ -116,15 +119,19 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             escapes.rows.extend(lane.rows);
         }
         // Large values are infinite in f16, and base colours may leave f32 when the sums of codes are subtracted.
-        let good = values.iter().fold(true, |good, v| good & v.is_finite())
-            && place.dc.as_flattened().iter().fold(true, |good, v| good & v.is_finite());
-        if good {
-            Ok((Piece { atoms, values, escapes, bit_counts: played.bits }, played.sums))
-        } else {
-            Err(Refusal::Damaged)
+        let refused = |range: usize, rule| Err(Refusal::Damaged(InRange { range, broken: Broken(rule) }));
+        if !values.iter().fold(true, |good, v| good & v.is_finite()) {
+            return refused(1 + layer.levels, "has an SH value that is infinite in f16");
         }
+        if !place.dc.as_flattened().iter().fold(true, |good, v| good & v.is_finite()) {
+            return refused(0, "has a base colour that is not finite with SH-rest taken away");
+        }
+        Ok((Piece { atoms, values, escapes, bit_counts: played.bits }, played.sums))
     }
 }
+
+/// There is no place for a Gaussian. It does not occur, since places are as many as Gaussians of the chunk.
+const NO_PLACE: Broken = Broken("has more Gaussians than the index says");
 
 /// The output of a decoded chunk.
 struct Out<'j, 'p> {
@@ -156,9 +163,9 @@ impl Sink for Out<'_, '_> {
         set: u32,
         group: &Group,
         levels: [usize; 2],
-    ) -> Option<()> {
+    ) -> Result<(), Broken> {
         if number == 0 && group.number[0] != self.cell {
-            return None;
+            return Err(Broken("begins with another cell than the index says"));
         }
         let is_alone =
             |l: usize| has(set, l) && self.alone.iter().any(|cells| cells.contains(&group.number[l]));
@@ -168,25 +175,20 @@ impl Sink for Out<'_, '_> {
             *position = drawn.position;
         }
         for l in (0..LANES).filter(|&l| has(set, l)) {
-            let i = self.starts[l] + number;
-            *self.place.positions.get_mut(i)? = drawn.position.map(|x| x[l]);
-            *self.place.scales.get_mut(i)? = drawn.scales.map(|x| x[l]);
-            *self.place.opacities.get_mut(i)? = drawn.opacity[l];
-            *self.place.rotations.get_mut(i)? = drawn.rotation.map(|x| x[l]);
-            *self.place.dc.get_mut(i)? = drawn.dc.map(|x| x[l]);
+            self.place.put(self.starts[l] + number, &drawn, l).ok_or(NO_PLACE)?;
         }
-        drawn.can_be(set).then_some(())
+        drawn.check(set)
     }
 
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn rest(&mut self, number: usize, rest: &Rest) -> Option<()> {
+    fn rest(&mut self, number: usize, rest: &Rest) -> Result<(), Broken> {
         let form = &self.with.form.rest;
         let (codes, rows) = rest.sizes(form);
         let row = size_of::<u32>() + form.dim * size_of::<f32>();
         if !(self.budget.grow(codes, self.with.nonzero_bytes()) && self.budget.grow(rows, row)) {
             self.is_full = true;
-            return None;
+            return Err(Broken("takes more memory than the limits allow"));
         }
         let degree = self.with.dictionary.degree();
         let per_channel = degree.rest_per_channel().min(MOST);
@@ -213,7 +215,7 @@ impl Sink for Out<'_, '_> {
                 for part in 0..form.least.len() {
                     match rest.coded(form, part, k, l, &mut cursors[l]) {
                         Coded::Exact(row) => {
-                            self.escapes[l].gaussians.push(u32::try_from(i).ok()?);
+                            self.escapes[l].gaussians.push(u32::try_from(i).map_err(|_| NO_PLACE)?);
                             self.escapes[l].rows.extend_from_slice(row);
                             exact = Some(row);
                         }
@@ -234,7 +236,9 @@ impl Sink for Out<'_, '_> {
                     }
                 }
                 let code = &nonzeros[first..];
-                *self.place.counts.get_mut(i)? = u8::try_from(code.len()).ok()?;
+                let count = u8::try_from(code.len())
+                    .map_err(|_| Broken("has a Gaussian with more nonzeros than coefficients"))?;
+                *self.place.counts.get_mut(i).ok_or(NO_PLACE)? = count;
                 if !has_view {
                     continue;
                 }
@@ -246,11 +250,11 @@ impl Sink for Out<'_, '_> {
                     }
                     None => self.with.seen_atoms.seen(code, &weights, l),
                 };
-                for (dc, added) in self.place.dc.get_mut(i)?.iter_mut().zip(added) {
+                for (dc, added) in self.place.dc.get_mut(i).ok_or(NO_PLACE)?.iter_mut().zip(added) {
                     *dc -= added;
                 }
             }
         }
-        Some(())
+        Ok(())
     }
 }

@@ -38,7 +38,8 @@ impl Decoder {
     pub(crate) fn of_prefix(head: &PackedHead, there: u64, whole: u64) -> Result<Self> {
         let decoder = BitstreamDecoder::new(head)?;
         if decoder.index().data_bytes() != whole {
-            let text = "packed ranges do not cover the data: no encoder writes it";
+            let ranges = decoder.index().data_bytes();
+            let text = format!("packed.head: its ranges have {ranges} bytes, and packed.data has {whole}");
             return Err(Error::malformed(&head.file, text));
         }
         let (mut chunks, mut spans, mut first) = (Vec::new(), Vec::new(), 0);

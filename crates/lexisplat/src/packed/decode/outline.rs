@@ -1,5 +1,6 @@
 //! The outline of a packed file: its layers, chunks and ranges.
 
+use std::fmt;
 use std::ops::Range;
 
 use crate::packed::bitstream::{Index, LayerForm};
@@ -83,6 +84,18 @@ impl RangeKind {
             _ if k <= form.levels => Self::Refinement(k - 1),
             _ if k < form.interim_range() => Self::Sh(k - 1 - form.levels),
             _ => Self::Interim,
+        }
+    }
+}
+
+impl fmt::Display for RangeKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Base => f.write_str("the base"),
+            // The format numbers refinements from 1, and parts from 0.
+            Self::Refinement(k) => write!(f, "refinement {}", k + 1),
+            Self::Sh(k) => write!(f, "part {k} of SH-rest"),
+            Self::Interim => f.write_str("the range of interim changes"),
         }
     }
 }

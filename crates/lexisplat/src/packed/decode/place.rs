@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use half::f16;
 
+use crate::packed::bitstream::drawn::Drawn;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::scene::splats::Geometry;
 use crate::sparse::codes::{Escapes, Indices};
@@ -20,6 +21,19 @@ pub(in crate::packed) struct Place<'a> {
     pub(in crate::packed) rotations: &'a mut [[f32; 4]],
     /// Number of nonzeros of each Gaussian.
     pub(in crate::packed) counts: &'a mut [u8],
+}
+
+impl Place<'_> {
+    /// Stores lane `l` of `drawn` as Gaussian `i`; `None` if there is no such Gaussian.
+    #[inline(always)]
+    pub(in crate::packed) fn put(&mut self, i: usize, drawn: &Drawn, l: usize) -> Option<()> {
+        *self.positions.get_mut(i)? = drawn.position.map(|x| x[l]);
+        *self.scales.get_mut(i)? = drawn.scales.map(|x| x[l]);
+        *self.opacities.get_mut(i)? = drawn.opacity[l];
+        *self.rotations.get_mut(i)? = drawn.rotation.map(|x| x[l]);
+        *self.dc.get_mut(i)? = drawn.dc.map(|x| x[l]);
+        Some(())
+    }
 }
 
 /// The codes of a decoded chunk, without their counts.

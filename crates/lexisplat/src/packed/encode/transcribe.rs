@@ -21,7 +21,10 @@ struct Transcriber<'l> {
 
 impl<'l> Transcriber<'l> {
     fn new(lookup: &'l Lookup, bytes: &'l [u8], lanes: usize) -> Option<Self> {
-        Some(Self { from: SymbolDecoder::new(lookup, bytes, lanes, false)?, to: SymbolRecorder::default() })
+        Some(Self {
+            from: SymbolDecoder::new(lookup, bytes, lanes, false).ok()?,
+            to: SymbolRecorder::default(),
+        })
     }
 }
 
@@ -66,9 +69,9 @@ impl Form {
         let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, layer.levels), Rest::default());
         let mut group = Group::default();
         for (step, set) in sets(gaussians, lanes).enumerate() {
-            walk.base(base, set, None, &mut group)?;
+            walk.base(base, set, None, &mut group).ok()?;
             for (k, range) in finer.iter_mut().enumerate() {
-                refine(range, set, &mut group, layer.levels - k)?;
+                refine(range, set, &mut group, layer.levels - k).ok()?;
             }
             if let Some(range) = changed.first_mut() {
                 interim(range, set, &mut group, &[[0; LANES]; CHANGES]);
@@ -76,18 +79,18 @@ impl Form {
             rest.push(set, group.colour);
             if rest.len() == BLOCK || step + 1 == steps {
                 for (part, range) in parts.iter_mut().enumerate() {
-                    rest.part(range, None, &self.rest, part)?;
+                    rest.part(range, None, &self.rest, part).ok()?;
                 }
                 rest.clear();
             }
             // Symbols of damaged ranges may take no bytes. Without this check, recording them would not end.
-            let good = |range: &Transcriber<'_>| range.from.good();
+            let good = |range: &Transcriber<'_>| range.from.check().is_ok();
             if !(good(base) && finer.iter().chain(&*parts).chain(&*changed).all(good)) {
                 return None;
             }
         }
         all.iter()
-            .all(|range| range.from.exhausted())
+            .all(|range| range.from.check_end().is_ok())
             .then(|| all.into_iter().map(|range| range.to).collect())
     }
 }

@@ -1,6 +1,11 @@
-//! Bits with adaptive probabilities: a range coder for the parts of a file that are written once.
+//! Bits with adaptive probabilities, for the parts of a file that are written once: the integers of its head, tables and
+//! dictionary.
 //!
-//! The decoder's state is a code and a range, of 32 bits each. All of its products are below 2^32.
+//! They are coded by rANS, as the symbols of a lane are ([`crate::packed::entropy::rans_decoder`]), with tables of two
+//! symbols that change after every bit. All products are below 2^32.
+
+use crate::packed::bitstream::broken::{BrokenHead, must};
+use crate::packed::entropy::tables::Model;
 
 /// Number of bits of a probability.
 const PRECISION: u32 = 12;
@@ -8,8 +13,11 @@ const PRECISION: u32 = 12;
 const LEAST: u16 = 48;
 /// Shifts of the distance from certainty: after each of the first bits, and after all later bits.
 const RATES: [u32; 6] = [1, 2, 3, 4, 4, 5];
-/// The range is kept at or above this.
-const LEAST_RANGE: u32 = 1 << 24;
+/// Least value of a state between two bits. A state takes a word of 16 bits when it falls below. The encoder starts from
+/// it, so a decoder ends with it.
+const LEAST_STATE: u32 = 1 << 16;
+/// Number of bits of a word.
+const WORD_BITS: u32 = 16;
 
 /// The probability one half.
 const HALF: u16 = 1 << (PRECISION - 1);
@@ -91,106 +99,93 @@ pub(in crate::packed) struct SignedBitModel {
 }
 
 /// An encoder that writes bits.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(in crate::packed) struct BitEncoder {
-    bytes: Vec<u8>,
-    low: u64,
-    range: u32,
-    /// Bytes that a carry may still change: one byte, followed by a number of bytes of 255.
-    held: u8,
-    waiting: usize,
-    started: bool,
-}
-
-impl Default for BitEncoder {
-    fn default() -> Self {
-        Self { bytes: Vec::new(), low: 0, range: u32::MAX, held: 0, waiting: 0, started: false }
-    }
+    /// The probability of 0, and the bit. rANS codes the last bit first, so they wait for the end.
+    steps: Vec<(u16, bool)>,
 }
 
 impl BitEncoder {
-    /// Moves byte 3 of `low` to the held bytes, and adds the carry above it to them.
-    fn shift(&mut self) {
-        let [_, _, _, byte, carry, ..] = self.low.to_le_bytes();
-        if carry == 1 || self.low < 0xff00_0000 {
-            if self.started {
-                self.bytes.push(self.held.wrapping_add(carry));
+    /// Returns the bytes: words of 16 bits, the first two of which are the state that a decoder starts with.
+    pub(in crate::packed) fn finish(self) -> Vec<u8> {
+        let mut state = LEAST_STATE;
+        let mut words: Vec<u16> = Vec::new();
+        for &(zero, bit) in self.steps.iter().rev() {
+            let Model { start, share } = model(zero, bit);
+            if state >> (u32::BITS - PRECISION) >= share {
+                words.push(low_word(state));
+                state >>= WORD_BITS;
             }
-            self.bytes.extend(std::iter::repeat_n(0xff_u8.wrapping_add(carry), self.waiting));
-            (self.held, self.waiting, self.started) = (byte, 0, true);
-        } else {
-            self.waiting += 1;
+            state = ((state / share) << PRECISION) + start + state % share;
         }
-        self.low = (self.low & 0x00ff_ffff) << 8;
+        words.extend([low_word(state), low_word(state >> WORD_BITS)]);
+        words.iter().rev().flat_map(|word| word.to_le_bytes()).collect()
     }
+}
 
-    /// Returns the bytes, without zeros at the end.
-    pub(in crate::packed) fn finish(mut self) -> Vec<u8> {
-        // The number within the final range that has the most zero bits at its end.
-        let end = self.low + u64::from(self.range);
-        let zeros =
-            (0..32).rev().find(|&zeros| ((self.low + (1 << zeros) - 1) >> zeros << zeros) < end).unwrap_or(0);
-        self.low = (self.low + (1 << zeros) - 1) >> zeros << zeros;
-        (0..5).for_each(|_| self.shift());
-        while self.bytes.last() == Some(&0) {
-            self.bytes.pop();
-        }
-        self.bytes
+/// Returns the range of the low bits of a state that stands for `bit` where 0 has the probability `zero`.
+fn model(zero: u16, bit: bool) -> Model {
+    let zero = u32::from(zero);
+    match bit {
+        false => Model { start: 0, share: zero },
+        true => Model { start: zero, share: (1 << PRECISION) - zero },
     }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the low word is meant")]
+fn low_word(state: u32) -> u16 {
+    state as u16
 }
 
 impl Bits for BitEncoder {
     fn split(&mut self, zero: u16, bit: bool) -> bool {
-        let bound = (self.range >> PRECISION) * u32::from(zero);
-        if bit {
-            self.low += u64::from(bound);
-            self.range -= bound;
-        } else {
-            self.range = bound;
-        }
-        while self.range < LEAST_RANGE {
-            self.range <<= 8;
-            self.shift();
-        }
+        self.steps.push((zero, bit));
         bit
     }
 }
 
-/// A decoder of the bits of a [`BitEncoder`]. Beyond the end all bytes are zeros.
+/// A decoder of the bits of a [`BitEncoder`]. Words beyond the end are zeros.
 #[derive(Debug)]
 pub(in crate::packed) struct BitDecoder<'a> {
-    bytes: &'a [u8],
-    next: usize,
-    code: u32,
-    range: u32,
+    words: std::slice::Iter<'a, [u8; 2]>,
+    state: u32,
+    /// Whether the bytes were whole words and the first state was not too small, and no word beyond the end was taken.
+    sound: bool,
 }
 
 impl<'a> BitDecoder<'a> {
     pub(in crate::packed) fn new(bytes: &'a [u8]) -> Self {
-        let mut decoder = Self { bytes, next: 0, code: 0, range: u32::MAX };
-        (0..4).for_each(|_| decoder.shift());
+        let (words, rest) = bytes.as_chunks();
+        let mut decoder = Self { words: words.iter(), state: 0, sound: rest.is_empty() };
+        let [high, low] = [decoder.word(), decoder.word()];
+        decoder.state = high << WORD_BITS | low;
+        decoder.sound &= decoder.state >= LEAST_STATE;
         decoder
     }
 
-    fn shift(&mut self) {
-        self.code = self.code << 8 | u32::from(self.bytes.get(self.next).copied().unwrap_or(0));
-        self.next += 1;
+    fn word(&mut self) -> u32 {
+        let word = self.words.next();
+        self.sound &= word.is_some();
+        word.map_or(0, |&word| u16::from_le_bytes(word).into())
+    }
+
+    /// Returns a broken rule of the part `name` of the head unless an encoder may have written the bytes, and wrote no more
+    /// bits than were taken.
+    pub(in crate::packed) fn finish(&self, name: &str) -> Result<(), BrokenHead> {
+        must(self.sound, || format!("{name}: not whole words, a first state below 2^16, or too few words"))?;
+        must(self.words.len() == 0, || format!("{name}: {} words are left", self.words.len()))?;
+        must(self.state == LEAST_STATE, || format!("{name}: the last state is {}, not 2^16", self.state))
     }
 }
 
 impl Bits for BitDecoder<'_> {
     fn split(&mut self, zero: u16, _: bool) -> bool {
-        let bound = (self.range >> PRECISION) * u32::from(zero);
-        let bit = self.code >= bound;
-        if bit {
-            self.code -= bound;
-            self.range -= bound;
-        } else {
-            self.range = bound;
-        }
-        while self.range < LEAST_RANGE {
-            self.range <<= 8;
-            self.shift();
+        let low = self.state & ((1 << PRECISION) - 1);
+        let bit = low >= u32::from(zero);
+        let Model { start, share } = model(zero, bit);
+        self.state = (self.state >> PRECISION) * share + low - start;
+        if self.state < LEAST_STATE {
+            self.state = self.state << WORD_BITS | self.word();
         }
         bit
     }
@@ -223,7 +218,8 @@ mod tests {
             let read = walk(&mut |odds, lengths, _| (decoder.signed(odds, 0), decoder.positive(lengths, 0)));
             assert_eq!(written, read);
             assert!(written.iter().zip(&values).all(|(w, v)| w.0 == *v));
-            assert!(decoder.next <= bytes.len() + 4);
+            assert_eq!(decoder.finish("bits"), Ok(()));
+            assert!(count == 0 || BitDecoder::new(&bytes).finish("bits").is_err());
         }
     }
 

@@ -21,12 +21,12 @@ const ENTRY: usize = 5;
 /// counted.
 #[must_use]
 pub fn decode(tables: &[u8], range: &[u8], lanes: u8, script: &[u8]) -> bool {
-    let Some(tables) = Tables::read(tables) else { return false };
+    let Ok(tables) = Tables::read(tables) else { return false };
     let written = tables.write();
     let again = Tables::read(&written).map(|tables| tables.write());
-    assert_eq!(again.as_deref(), Some(written.as_slice()), "tables change as they are written");
+    assert_eq!(again.as_deref(), Ok(written.as_slice()), "tables change as they are written");
     let lookup = Lookup::new(&tables);
-    let Some(mut player) = SymbolDecoder::new(&lookup, range, 1 + usize::from(lanes) % LANES, true) else {
+    let Ok(mut player) = SymbolDecoder::new(&lookup, range, 1 + usize::from(lanes) % LANES, true) else {
         return false;
     };
     for &[kind, slot, context, low, high] in script.as_chunks::<ENTRY>().0 {
@@ -35,7 +35,7 @@ pub fn decode(tables: &[u8], range: &[u8], lanes: u8, script: &[u8]) -> bool {
     }
     let counts = player.bit_counts.as_ref();
     assert!(counts.is_some_and(|counts| counts.0.iter().all(|b| b.is_finite() && *b >= 0.0)));
-    player.exhausted()
+    player.check_end().is_ok()
 }
 
 /// An entry of a script of [`round_trip`]: kind, set of contexts and context; lanes; value.
@@ -58,19 +58,19 @@ pub fn round_trip(lanes: u8, script: &[Entry]) -> bool {
     let coded: Vec<[u64; LANES]> = asks.iter().map(|a| ask(&mut recorder, a)).collect();
     let Some((_, tables)) = tables_of(&recorder) else { return false };
     let range = recorder.finish(&tables, lanes);
-    let Some(read) = Tables::read(&tables.write()) else { return false };
+    let Ok(read) = Tables::read(&tables.write()) else { return false };
     let lookup = Lookup::new(&read);
-    let Some(mut player) = SymbolDecoder::new(&lookup, &range, lanes, false) else { return false };
+    let Ok(mut player) = SymbolDecoder::new(&lookup, &range, lanes, false) else { return false };
     // All values are decoded, even after a difference.
     let decoded: Vec<[u64; LANES]> = asks.iter().map(|a| ask(&mut player, a)).collect();
-    decoded == coded && player.exhausted()
+    decoded == coded && player.check_end().is_ok()
 }
 
 /// Returns the input of [`decode`]: the tables and the first range of a packed scene. Both are empty if the head cannot be
 /// read.
 #[must_use]
 pub fn parts(packed: &Packed) -> [Vec<u8>; 2] {
-    let Some(head) = Head::read(&packed.head().bytes, packed.head().degree.rest()) else {
+    let Ok(head) = Head::read(&packed.head().bytes, packed.head().degree.rest()) else {
         return Default::default();
     };
     let length = head.index.order.first().and_then(|place| {
@@ -84,7 +84,7 @@ pub fn parts(packed: &Packed) -> [Vec<u8>; 2] {
 /// cannot be read.
 #[must_use]
 pub fn resealed(head: &[u8], degree: ShDegree, data: &[u8]) -> Option<Vec<u8>> {
-    let mut head = Head::read(head, degree.rest())?;
+    let mut head = Head::read(head, degree.rest()).ok()?;
     for range in head.index.chunks.iter_mut().flat_map(|chunk| &mut chunk.ranges) {
         let start = usize::try_from(range.start).ok()?;
         let bytes = data.get(start..).and_then(|rest| rest.get(..range.length as usize));
@@ -107,7 +107,7 @@ pub fn rearranged(
     data: &[u8],
     below: &mut dyn FnMut(usize) -> usize,
 ) -> Option<(Vec<u8>, Vec<u8>, usize)> {
-    let mut head = Head::read(head, degree.rest())?;
+    let mut head = Head::read(head, degree.rest()).ok()?;
     let index = &mut head.index;
     let bytes = |place: &Place| {
         let range = index.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind))?;

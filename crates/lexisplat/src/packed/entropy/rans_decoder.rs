@@ -1,5 +1,6 @@
 //! The entropy decoder of a range.
 
+use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::bitstream::streams::{CONTEXTS, Slot};
 use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
@@ -28,18 +29,24 @@ pub(in crate::packed) struct SymbolDecoder<'a> {
 }
 
 impl<'a> SymbolDecoder<'a> {
-    /// Creates a decoder. `None` if `bytes` cannot be a range of `lanes` lanes. With `count_bits`, the bits of streams are
+    /// Creates a decoder. Returns the broken rule if `bytes` cannot be a range of `lanes` lanes. With `count_bits`, the bits of streams are
     /// counted.
     pub(in crate::packed) fn new(
         lookup: &'a Lookup,
         bytes: &'a [u8],
         lanes: usize,
         count_bits: bool,
-    ) -> Option<Self> {
+    ) -> Result<Self, Broken> {
+        let lengths = lanes.checked_sub(1).ok_or(Broken("has no lane"))?;
         let width = length_bytes(bytes.len());
-        let (lengths, words) = bytes.split_at_checked(width * lanes.checked_sub(1)?)?;
-        let (words, []) = words.as_chunks::<2>() else { return None };
-        let total = u32::try_from(words.len()).ok().filter(|&total| (2..=MAX_WORDS).contains(&total))?;
+        let (lengths, words) = bytes
+            .split_at_checked(width * lengths)
+            .ok_or(Broken("ends within the numbers of words of its lanes"))?;
+        let (words, []) = words.as_chunks::<2>() else { return Err(Broken("has half a word at its end")) };
+        let total = u32::try_from(words.len())
+            .ok()
+            .filter(|&total| total <= MAX_WORDS)
+            .ok_or(Broken("has more than 2^30 words"))?;
         let mut player = Self {
             lookup,
             words,
@@ -56,28 +63,49 @@ impl<'a> SymbolDecoder<'a> {
             end = match lengths.get(l * width..(l + 1) * width) {
                 Some(bytes) => {
                     let length = bytes.iter().rev().fold(0, |length, &byte| length << 8 | u32::from(byte));
-                    end.checked_add(length).filter(|&end| end <= total)?
+                    end.checked_add(length)
+                        .filter(|&end| end <= total)
+                        .ok_or(Broken("has fewer words than its lanes are said to have"))?
                 }
                 None => total,
             };
-            let [high, low] = *words.get(start as usize..end as usize)?.first_chunk()?;
+            let [high, low] = *words
+                .get(start as usize..end as usize)
+                .and_then(<[_]>::first_chunk)
+                .ok_or(Broken("has a lane of fewer than two words"))?;
             let state = u32::from(u16::from_le_bytes(high)) << 16 | u32::from(u16::from_le_bytes(low));
-            player.states[l] = Some(state).filter(|&state| state >= LEAST)?;
+            player.states[l] = Some(state)
+                .filter(|&state| state >= LEAST)
+                .ok_or(Broken("has a lane whose first state is below 2^16"))?;
             player.next[l] = start + 2;
             player.ends[l] = end;
         }
-        Some(player)
+        Ok(player)
     }
 
-    /// Returns whether the range can still be the output of an encoder: no symbol without a table was asked for, and no
-    /// lane was read beyond its end.
-    pub(in crate::packed) fn good(&self) -> bool {
-        !self.damaged && self.next.iter().zip(&self.ends).all(|(next, end)| next <= end)
+    /// Returns the rule that the range broke so far: a symbol without a table was asked for, or a lane was read beyond its
+    /// end.
+    pub(in crate::packed) fn check(&self) -> Result<(), Broken> {
+        if self.damaged {
+            return Err(Broken("has a symbol of a set of contexts without tables"));
+        }
+        match self.next.iter().zip(&self.ends).all(|(next, end)| next <= end) {
+            true => Ok(()),
+            false => Err(Broken("ends within the words of a lane")),
+        }
     }
 
-    /// Returns whether every lane was read exactly to its end, and is in the state from which an encoder starts.
-    pub(in crate::packed) fn exhausted(&self) -> bool {
-        !self.damaged && self.states == [LEAST; LANES] && self.next == self.ends
+    /// Returns a broken rule unless every lane was read exactly to its end, and is in the state from which an encoder
+    /// starts.
+    pub(in crate::packed) fn check_end(&self) -> Result<(), Broken> {
+        self.check()?;
+        if self.next != self.ends {
+            return Err(Broken("has words that no symbol takes"));
+        }
+        match self.states == [LEAST; LANES] {
+            true => Ok(()),
+            false => Err(Broken("ends with a state that is not 2^16")),
+        }
     }
 
     /// Takes the next symbol of each lane whose context is not [`IDLE`], by the table of the context.

@@ -2,15 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::packed::bitstream::broken::{BrokenHead, must};
 use crate::packed::bitstream::streams::{CONTEXTS, SLOTS, Slot};
 use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, BitModel, Bits};
-use crate::packed::entropy::log_probabilities::{Kind, LevelBitModels, LogProbabilities, MAX_SYMBOLS};
+use crate::packed::entropy::log_probabilities::{LevelBitModels, LogProbabilities, MAX_SYMBOLS};
 
 /// Estimates of the bits of a table, and of each of its symbols, for the first pass that joins contexts.
 const TABLE_COST: f64 = 8.0;
 const SYMBOL_COST: f64 = 1.0;
-/// Binary logarithm of the number of levels an octave at which joined tables are compared.
-const JOINING_GRAIN: u32 = 1;
 /// Number of the table of a context that is never used.
 const NONE: u8 = u8::MAX;
 /// Number of all contexts of all sets.
@@ -55,8 +54,8 @@ impl Histogram {
     }
 
     /// Returns a better estimate of the same bits, from a fitted table.
-    fn fitted_cost(&self, kind: Kind, precision: u32) -> f64 {
-        LogProbabilities::fit(&self.counts, kind, precision, JOINING_GRAIN..=JOINING_GRAIN).1
+    fn fitted_cost(&self, precision: u32) -> f64 {
+        LogProbabilities::fit(&self.counts, precision).1
     }
 }
 
@@ -79,28 +78,10 @@ struct Table {
 impl Table {
     /// Makes a table of probabilities of `precision` bits. `None` if there are no symbols or too many.
     fn new(levels: LogProbabilities, precision: u32) -> Option<Self> {
-        let whole = 1_u32 << precision;
-        let weights = levels.weights(precision);
-        // A weight is below 2^19, so the total is below 2^27, and a product of a weight with the whole is below 2^31.
-        let total: u32 = weights.iter().sum();
-        if total == 0 || weights.len() > MAX_SYMBOLS {
-            return None;
-        }
-        let share = |&weight: &u32| {
-            if weight == 0 { 0 } else { i64::from((weight * whole / total).max(1)) }
-        };
-        let mut shares: Vec<i64> = weights.iter().map(share).collect();
-        // The most frequent symbols take the difference that rounding leaves, since it costs least there.
-        let mut left = i64::from(whole) - shares.iter().sum::<i64>();
-        while left != 0 {
-            let most = (0..shares.len()).max_by_key(|&k| (shares[k], std::cmp::Reverse(k)))?;
-            let change = if left > 0 { left } else { left.max(-(shares[most] / 2)) };
-            shares[most] += change;
-            left -= change;
-        }
+        let shares = levels.shares(precision).filter(|shares| shares.len() <= MAX_SYMBOLS)?;
         let mut start = 0;
         let models = shares.iter().map(|&share| {
-            let model = Model { start, share: u32::try_from(share).unwrap_or(0) };
+            let model = Model { start, share };
             start += model.share;
             model
         });
@@ -125,15 +106,10 @@ impl Tables {
         let mut map = Vec::with_capacity(histograms.len());
         let mut tables = Vec::new();
         for (slot, contexts) in Slot::all().zip(histograms.chunks(CONTEXTS)) {
-            let (kind, precision) = (Kind::of(slot.stream), slot.stream.precision());
-            let (joined, of) = join(contexts, kind, precision);
+            let precision = slot.stream.precision();
+            let (joined, of) = join(contexts, precision);
             map.extend(of);
-            let table = |h: &Histogram| {
-                Table::new(
-                    LogProbabilities::fit(&h.counts, kind, precision, LogProbabilities::grains(&h.counts)).0,
-                    precision,
-                )
-            };
+            let table = |h: &Histogram| Table::new(LogProbabilities::fit(&h.counts, precision).0, precision);
             let made: Option<Vec<Table>> = joined.iter().map(table).collect();
             tables.push(made?);
         }
@@ -173,15 +149,19 @@ impl Tables {
         encoder.finish()
     }
 
-    /// Reads the bytes that [`Self::write`] wrote; `None` for all other bytes.
-    pub(in crate::packed) fn read(bytes: &[u8]) -> Option<Self> {
+    /// Reads the bytes that [`Self::write`] wrote.
+    ///
+    /// # Errors
+    /// The broken rule for bytes that are not the bits of tables, or not of these alone.
+    pub(in crate::packed) fn read(bytes: &[u8]) -> Result<Self, BrokenHead> {
         let mut decoder = BitDecoder::new(bytes);
         let read = Self { map: Vec::new(), tables: Vec::new() }.code(&mut decoder)?;
-        (read.write() == bytes).then_some(read)
+        decoder.finish("the tables")?;
+        Ok(read)
     }
 
     /// Codes the numbers of tables of contexts, and the tables. A decoder codes empty ones and gets the decoded ones.
-    fn code(&self, bits: &mut dyn Bits) -> Option<Self> {
+    fn code(&self, bits: &mut dyn Bits) -> Result<Self, BrokenHead> {
         let mut odds = TablesOdds::default();
         let mut all = Self { map: Vec::with_capacity(ALL_CONTEXTS), tables: Vec::with_capacity(SLOTS) };
         let mut before = false;
@@ -205,25 +185,30 @@ impl Tables {
                             true => count,
                             false => {
                                 let width = usize::BITS - (count - 1).leading_zeros();
-                                Some(bits.even(width, wanted as u32) as usize)
-                                    .filter(|&table| table < count)?
+                                let table = bits.even(width, wanted as u32) as usize;
+                                must(table < count, || {
+                                    format!("the tables: a context has table {table} of {count}")
+                                })?;
+                                table
                             }
                         };
                         count = count.max(last + 1);
                     }
-                    all.map.push(u8::try_from(last).ok()?);
+                    all.map.push(u8::try_from(last).unwrap_or(NONE));
                 }
             }
-            let (kind, precision) = (Kind::of(slot.stream), slot.stream.precision());
+            let precision = slot.stream.precision();
             let mut tables = Vec::with_capacity(count);
             for k in 0..count {
                 let none = LogProbabilities::default();
                 let levels = own.get(k).map_or(&none, |table| &table.levels);
-                tables.push(Table::new(levels.code(bits, &mut odds.levels, kind, precision)?, precision)?);
+                let levels = levels.code(bits, &mut odds.levels, precision)?;
+                let no_symbols = || BrokenHead("the tables: a table has no symbols".to_owned());
+                tables.push(Table::new(levels, precision).ok_or_else(no_symbols)?);
             }
             all.tables.push(tables);
         }
-        Some(all)
+        Ok(all)
     }
 }
 
@@ -252,7 +237,7 @@ struct Group {
 
 /// Joins contexts until no shared table costs less than two. Returns the histograms of the tables in the order of their
 /// first contexts, and for each context the number of its histogram. Probabilities have `precision` bits.
-fn join(contexts: &[Histogram], kind: Kind, precision: u32) -> (Vec<Histogram>, Vec<u8>) {
+fn join(contexts: &[Histogram], precision: u32) -> (Vec<Histogram>, Vec<u8>) {
     let group = |context: usize| Group {
         histogram: contexts[context].clone(),
         members: vec![context],
@@ -262,9 +247,9 @@ fn join(contexts: &[Histogram], kind: Kind, precision: u32) -> (Vec<Histogram>, 
     let mut groups: Vec<Group> = used.map(group).collect();
     join_groups(&mut groups, |histogram| histogram.cost(precision));
     for group in &mut groups {
-        group.cost = group.histogram.fitted_cost(kind, precision);
+        group.cost = group.histogram.fitted_cost(precision);
     }
-    join_groups(&mut groups, |histogram| histogram.fitted_cost(kind, precision));
+    join_groups(&mut groups, |histogram| histogram.fitted_cost(precision));
     groups.sort_by_key(|group| group.members.first().copied());
     let mut map = vec![NONE; contexts.len()];
     for (number, group) in (0..).zip(&groups) {
@@ -468,15 +453,22 @@ mod tests {
     #[test]
     fn no_other_bytes_are_tables() {
         let bytes = Tables::new(&histograms(90)).unwrap().write();
-        assert!(Tables::read(&[&bytes[..], &[0]].concat()).is_none());
-        assert!(Tables::read(&[&bytes[..], &[1]].concat()).is_none());
-        assert!(Tables::read(&[0xff; 300]).is_none());
+        assert!(Tables::read(&[&bytes[..], &[0]].concat()).is_err());
+        assert!(Tables::read(&[&bytes[..], &[1]].concat()).is_err());
+        assert!(Tables::read(&[0xff; 300]).is_err());
+        assert!(Tables::read(&[&bytes[..], &[0, 0]].concat()).is_err());
+        assert!(Tables::read(&bytes[..bytes.len() - 2]).is_err());
         let mut rng = SplitMix64::new(5);
         for _ in 0..200 {
             let mut damaged = bytes.clone();
             damaged[rng.below(bytes.len())] ^= 1 << rng.below(8);
-            // If damaged bytes are accepted, the tables that are read are written as the same bytes.
-            assert!(Tables::read(&damaged).is_none_or(|tables| tables.write() == damaged));
+            // If damaged bytes are accepted, they are other tables. A context may name its table in two ways.
+            if let Ok(tables) = Tables::read(&damaged) {
+                let written = tables.write();
+                assert!(
+                    written != bytes && Tables::read(&written).is_ok_and(|again| again.write() == written)
+                );
+            }
         }
     }
 }

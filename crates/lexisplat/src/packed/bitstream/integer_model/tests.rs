@@ -165,20 +165,15 @@ fn integers_come_back_in_one_form() {
                 *number = (rng.next() as i16 >> shift) >> zeros << zeros;
             }
         }
-        let mut out = BitWriter::default();
-        integers.write(&mut out);
-        let bytes = out.finish();
+        let bytes = integers.write();
         let mut read = Integers::default();
-        let mut from = BitReader::new(&bytes);
-        assert_eq!(read.read(&mut from), Some(()));
-        assert!(from.exhausted());
+        assert_eq!(read.read(&bytes), Ok(()));
         assert_eq!(read, integers);
+        assert!(Integers::default().read(&[&bytes[..], &[0, 0]].concat()).is_err());
+        assert!(Integers::default().read(&bytes[..bytes.len() - 2]).is_err());
     }
-    // A width that is larger than the numbers of the group need, and one that is too large.
-    for first in [1, 31] {
-        let mut bytes = vec![0; 200];
-        bytes[0] = first;
-        assert_eq!(Integers::default().read(&mut BitReader::new(&bytes)), None);
-    }
-    assert_eq!([0, 1, -1, 3, -4, i16::MAX, i16::MIN].map(width), [0, 2, 1, 3, 3, 16, 16]);
+    // A number that 16 bits do not hold.
+    let mut encoder = BitEncoder::default();
+    encoder.signed(&mut SignedBitModel::default(), 1 << 14);
+    assert!(Integers::default().read(&encoder.finish()).is_err());
 }

@@ -197,7 +197,7 @@ impl Tables {
 
     pub(super) fn read(&self, plan: &Plan) -> Result<tables::Tables> {
         plan.check("tables", [self.scene], None)?;
-        tables::Tables::read(&self.bytes).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
+        tables::Tables::read(&self.bytes).map_err(|rule| Error::parameter("tables", rule, "tables"))
     }
 }
 
@@ -220,7 +220,7 @@ impl Coded {
         plan.check("coded bucket", [self.scene], None)?;
         let wrong =
             || Error::parameter("coded bucket", self.bucket, "a bucket whose symbols the tables have");
-        let own = tables::Tables::read(&self.tables).ok_or_else(wrong)?;
+        let own = tables::Tables::read(&self.tables).map_err(|_| wrong())?;
         let (lookup, common) = (Lookup::new(&own), tables.read(plan)?);
         let encoding = coding.encoding(plan)?;
         let forms = encoding.layering.forms(encoding.head.rest.least.len());
