@@ -118,8 +118,9 @@ impl WholeAtoms {
         }
         let mut decoder = BitDecoder::new(bytes);
         let read = blank.code(&mut decoder, learned);
-        let beyond = read.numbers.iter().find(|number| number.abs() > MOST);
-        must(beyond.is_none(), || format!("the dictionary: a number is {beyond:?}, above {MOST} in size"))?;
+        if let Some(number) = read.numbers.iter().find(|number| number.abs() > MOST) {
+            return Err(BrokenHead(format!("the dictionary: a number is {number}, above {MOST} in size")));
+        }
         decoder.finish("the dictionary")?;
         Ok(read)
     }

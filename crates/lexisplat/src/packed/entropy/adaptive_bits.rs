@@ -149,30 +149,38 @@ impl Bits for BitEncoder {
 pub(in crate::packed) struct BitDecoder<'a> {
     words: std::slice::Iter<'a, [u8; 2]>,
     state: u32,
-    /// Whether the bytes were whole words and the first state was not too small, and no word beyond the end was taken.
-    sound: bool,
+    /// The first rule that the bytes break.
+    broken: Option<&'static str>,
 }
 
 impl<'a> BitDecoder<'a> {
     pub(in crate::packed) fn new(bytes: &'a [u8]) -> Self {
         let (words, rest) = bytes.as_chunks();
-        let mut decoder = Self { words: words.iter(), state: 0, sound: rest.is_empty() };
+        let mut decoder = Self { words: words.iter(), state: 0, broken: None };
         let [high, low] = [decoder.word(), decoder.word()];
         decoder.state = high << WORD_BITS | low;
-        decoder.sound &= decoder.state >= LEAST_STATE;
+        if !rest.is_empty() {
+            decoder.broken = Some("half a word is at the end");
+        } else if decoder.state < LEAST_STATE {
+            decoder.broken.get_or_insert("the first state is below 2^16");
+        }
         decoder
     }
 
     fn word(&mut self) -> u32 {
-        let word = self.words.next();
-        self.sound &= word.is_some();
-        word.map_or(0, |&word| u16::from_le_bytes(word).into())
+        let Some(&word) = self.words.next() else {
+            self.broken.get_or_insert("the words end too early");
+            return 0;
+        };
+        u16::from_le_bytes(word).into()
     }
 
     /// Returns a broken rule of the part `name` of the head unless an encoder may have written the bytes, and wrote no more
     /// bits than were taken.
     pub(in crate::packed) fn finish(&self, name: &str) -> Result<(), BrokenHead> {
-        must(self.sound, || format!("{name}: not whole words, a first state below 2^16, or too few words"))?;
+        if let Some(broken) = self.broken {
+            return Err(BrokenHead(format!("{name}: {broken}")));
+        }
         must(self.words.len() == 0, || format!("{name}: {} words are left", self.words.len()))?;
         must(self.state == LEAST_STATE, || format!("{name}: the last state is {}, not 2^16", self.state))
     }
