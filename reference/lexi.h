@@ -218,7 +218,7 @@ static int lexi__too_large(lexi__call *call, const char *field, const char *rule
     return lexi__fail(call, LEXI_OVER_LIMIT, field, rule, numbers);
 }
 
-/* The same with the name of a tensor or of metadata in the field. */
+/* Refuse with the name of a tensor or of metadata in the field. */
 static int lexi__named(lexi__call *call, const char *kind, const char *name, size_t length, const char *rule) {
     char field[100];
     size_t at = lexi__put(field, 0, sizeof field, kind, strlen(kind));
@@ -1821,13 +1821,14 @@ static int lexi__range_sum(lexi__work *x) {
 static int lexi__decode_range(lexi__work *x, const lexi_range *range, int verify) {
     uint32_t n = x->chunk->count, lanes = (uint32_t)lexi__clamp((int32_t)(n / 1024), 1, 16), gaussian = 0;
     uint32_t width = range->length < 1 << 17 ? 2 : 4, numbers = (lanes - 1) * width;
-    const unsigned char *words = range->bytes + numbers;
+    const unsigned char *words = range->bytes;
     uint64_t left;
     x->range = range;
     if (!lexi__range_sum(x)) return 0;
     if (range->length % 2 || range->length < numbers)
         return lexi__range_fail(x, "% bytes are no whole words", range->length, 0);
     left = (range->length - numbers) / 2;
+    words += numbers;
     if (left > 1 << 30) return lexi__range_fail(x, "it has % words, at most 2^30 are allowed", left, 0);
     for (uint32_t i = 0; i < lanes; i++) {
         lexi__lane lane;

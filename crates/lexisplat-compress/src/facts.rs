@@ -51,6 +51,9 @@ impl From<f64> for ByteCount {
     }
 }
 
+/// Name of the part that is the difference of the bytes of the tensor `packed.data` and the bits of its streams.
+pub(crate) const ROUNDING: &str = "rounding";
+
 /// Returns the bytes of each part of a file, by name. Their sum is the size of the file.
 ///
 /// `tensors` are the bytes of each tensor and of the header. For a packed file `streams` are the bits of each stream in the
@@ -69,7 +72,7 @@ pub fn part_bytes(tensors: &[(String, u64)], streams: &[StreamBits]) -> Vec<(Str
     for (name, bytes) in tensors {
         let bytes = *bytes as f64;
         match name.strip_prefix("packed.") {
-            Some("data") => out.push(("rounding".to_owned(), bytes - coded)),
+            Some("data") => out.push((ROUNDING.to_owned(), bytes - coded)),
             Some(name) => out.push((name.to_owned(), bytes)),
             None => out.push((name.clone(), bytes)),
         }

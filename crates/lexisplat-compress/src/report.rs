@@ -5,7 +5,7 @@ use lexisplat::stream::{Compressed, PackedFile};
 use lexisplat::{CompressReport, Dictionary, Layout, Record, ShDegree};
 use serde::{Serialize, Serializer};
 
-use crate::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
+use crate::facts::{ByteCount, ROUNDING, RecordReport, part_bytes, sh_bytes};
 use crate::target::MIN_PSNR;
 
 /// Largest usual difference of the judged quality and the worst view, in dB. A larger difference is a sign of views unlike
@@ -204,17 +204,43 @@ fn rounded(bytes: f64) -> ByteCount {
     ByteCount::from((bytes * 8.0).round() / 8.0)
 }
 
+/// Rounds parts to bits. The part `rounding` takes the difference, so that the sum is still that of all parts.
+fn rounded_parts(parts: &[(String, f64)]) -> Vec<(&str, ByteCount)> {
+    let to_bits = |bytes: f64| (bytes * 8.0).round() / 8.0;
+    let mut left = to_bits(parts.iter().map(|part| part.1).sum());
+    left -= parts.iter().filter(|part| part.0 != ROUNDING).map(|part| to_bits(part.1)).sum::<f64>();
+    let part = |(name, bytes): &'_ (String, f64)| if name == ROUNDING { left } else { to_bits(*bytes) };
+    parts.iter().map(|named| (named.0.as_str(), ByteCount::from(part(named)))).collect()
+}
+
 fn eighths<S: Serializer>(bytes: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     rounded(*bytes).serialize(serializer)
 }
 
 fn map<S: Serializer>(parts: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(parts.iter().map(|(name, bytes)| (name, rounded(*bytes))))
+    serializer.collect_map(rounded_parts(parts))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rounded_parts_add_up() {
+        let thirds = |name: &str, bytes: f64| (name.to_owned(), bytes / 3.0);
+        let parts =
+            [thirds("scale", 10.0), thirds("dc", 10.0), thirds("position", 10.0), thirds(ROUNDING, 30.0)];
+        let found = rounded_parts(&parts);
+        let bytes = |count: &ByteCount| match count {
+            ByteCount::Whole(bytes) => *bytes as f64,
+            ByteCount::Part(bytes) => *bytes,
+        };
+        assert_eq!(found.iter().map(|part| bytes(&part.1)).sum::<f64>(), 20.0);
+        assert_eq!(
+            found.iter().map(|part| part.0).collect::<Vec<_>>(),
+            ["scale", "dc", "position", ROUNDING]
+        );
+    }
 
     #[test]
     fn views_that_differ_much_make_a_result_uncertain() {
