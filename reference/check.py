@@ -275,7 +275,7 @@ def main():
             data, words = mutated(path.read_bytes(), source)
             damaged = Path(folder) / f"{path.stem}.{args.seed}.{k}.lexi"
             damaged.write_bytes(data)
-            first = source.choice([None, None, None, source.randrange(1, len(data) + 2)])
+            first = source.choice([None, None, None, source.randrange(1, max(len(data), 2))])
             both, found = compare(damaged, first, verify=False)
             accepted, wrong = accepted + both, wrong + bool(found)
             for text in found:
