@@ -47,11 +47,15 @@ static unsigned char *read_file(const char *path, unsigned long long most, size_
     return NULL;
 }
 
+static unsigned char *put_bits(unsigned char *out, uint64_t bits, int bytes) {
+    for (int k = 0; k < bytes; k++) *out++ = (unsigned char)(bits >> (8 * k));
+    return out;
+}
+
 static unsigned char *put_float(unsigned char *out, float x) {
     uint32_t bits;
     memcpy(&bits, &x, 4);
-    for (int k = 0; k < 4; k++) *out++ = (unsigned char)(bits >> (8 * k));
-    return out;
+    return put_bits(out, bits, 4);
 }
 
 static unsigned char *put_floats(unsigned char *out, const float *x, size_t n) {
@@ -62,8 +66,7 @@ static unsigned char *put_floats(unsigned char *out, const float *x, size_t n) {
 static unsigned char *put_double(unsigned char *out, double x) {
     uint64_t bits;
     memcpy(&bits, &x, 8);
-    for (int k = 0; k < 8; k++) *out++ = (unsigned char)(bits >> (8 * k));
-    return out;
+    return put_bits(out, bits, 8);
 }
 
 static void put_names(FILE *out, const char *name, int n) {

@@ -200,13 +200,12 @@ fn record<S: Serializer>(record: &Record, serializer: S) -> Result<S::Ok, S::Err
 }
 
 /// Rounds bytes to an eighth. Streams need not be whole bytes; the sums of their bits are exact to an eighth of a byte.
-fn rounded(bytes: f64) -> ByteCount {
-    ByteCount::from((bytes * 8.0).round() / 8.0)
+fn to_bits(bytes: f64) -> f64 {
+    (bytes * 8.0).round() / 8.0
 }
 
 /// Rounds parts to bits. The part `rounding` takes the difference, so that the sum is still that of all parts.
 fn rounded_parts(parts: &[(String, f64)]) -> Vec<(&str, ByteCount)> {
-    let to_bits = |bytes: f64| (bytes * 8.0).round() / 8.0;
     let mut left = to_bits(parts.iter().map(|part| part.1).sum());
     left -= parts.iter().filter(|part| part.0 != ROUNDING).map(|part| to_bits(part.1)).sum::<f64>();
     let part = |(name, bytes): &'_ (String, f64)| if name == ROUNDING { left } else { to_bits(*bytes) };
@@ -214,7 +213,7 @@ fn rounded_parts(parts: &[(String, f64)]) -> Vec<(&str, ByteCount)> {
 }
 
 fn eighths<S: Serializer>(bytes: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    rounded(*bytes).serialize(serializer)
+    ByteCount::from(to_bits(*bytes)).serialize(serializer)
 }
 
 fn map<S: Serializer>(parts: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {

@@ -11,12 +11,13 @@ use lexisplat_sample::{SampleOptions, scene};
 
 /// Of each there is what it decodes to.
 const NAMES: [&str; 4] = ["packed3", "packed3_degree0", "packed3_escapes", LAYERS.0];
-/// A file of two layers, of which there is also what its first [`SHOWN_TENTHS`] tenths decode to, and the CRC-32 of the PLY that its first tenths decode to, from 2 to 10 of them.
+/// The name of a file of two layers, and the CRC-32 of the PLY that its first tenths decode to, from 2 to 10 of them.
 const LAYERS: (&str, [u32; 9]) = (
     "packed3_layers",
     [3476501158, 3476501158, 3476501158, 3476501158, 3476501158, 4030427560, 659720978, 3148367324, 28826881],
 );
 
+/// Number of tenths of the file of two layers whose scene is a golden file too.
 const SHOWN_TENTHS: usize = 8;
 
 fn golden(name: &str, kind: &str) -> PathBuf {

@@ -207,21 +207,18 @@ impl Form {
                 }
                 // Symbols of damaged files may take no bytes, so the decoders are checked before anything is made of the
                 // symbols.
-                base.check().map_err(in_range(0))?;
-                check_each(&finer, 1, SymbolDecoder::check)?;
-                check_each(&parts, first_part, SymbolDecoder::check)?;
-                check_each(changed.as_slice(), layer.interim_range(), SymbolDecoder::check)?;
+                for (range, decoder) in numbered(layer, &base, &finer, &parts, &changed) {
+                    decoder.check().map_err(in_range(range))?;
+                }
                 sink.rest(step + 1 - rest.len(), &rest).map_err(in_range(first_part))?;
                 rest.clear();
             }
         }
-        base.check_end().map_err(in_range(0))?;
-        check_each(&finer, 1, SymbolDecoder::check_end)?;
-        check_each(&parts, first_part, SymbolDecoder::check_end)?;
-        check_each(changed.as_slice(), layer.interim_range(), SymbolDecoder::check_end)?;
-        let all = std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
         let mut bits = BitCounts::default();
-        all.filter_map(|player| player.bit_counts.as_ref()).for_each(|counts| bits.add(counts));
+        for (range, decoder) in numbered(layer, &base, &finer, &parts, &changed) {
+            decoder.check_end().map_err(in_range(range))?;
+            decoder.bit_counts.iter().for_each(|counts| bits.add(counts));
+        }
         Ok(Played { sums: sums.into_iter().map(Sums::finish).collect(), bits })
     }
 }
@@ -238,13 +235,17 @@ fn in_range(range: usize) -> impl Fn(Broken) -> InRange {
     move |broken| InRange { range, broken }
 }
 
-/// Calls `check` for the decoders of the ranges from `first` on.
-fn check_each<'a>(
-    decoders: &[SymbolDecoder<'a>],
-    first: usize,
-    check: impl Fn(&SymbolDecoder<'a>) -> Result<(), Broken>,
-) -> Result<(), InRange> {
-    decoders.iter().enumerate().try_for_each(|(k, decoder)| check(decoder).map_err(in_range(first + k)))
+/// Returns the decoders of the ranges of a chunk that are there, each with the number of its range.
+fn numbered<'d, 'a>(
+    layer: LayerForm,
+    base: &'d SymbolDecoder<'a>,
+    finer: &'d [SymbolDecoder<'a>],
+    parts: &'d [SymbolDecoder<'a>],
+    changed: &'d Option<SymbolDecoder<'a>>,
+) -> impl Iterator<Item = (usize, &'d SymbolDecoder<'a>)> {
+    let parts = (1 + layer.levels..).zip(parts);
+    let changed = changed.iter().map(move |decoder| (layer.interim_range(), decoder));
+    std::iter::once((0, base)).chain((1..).zip(finer)).chain(parts).chain(changed)
 }
 
 /// A chunk whose symbols are recorded.

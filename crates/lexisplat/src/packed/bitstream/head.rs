@@ -173,13 +173,12 @@ impl Head {
         let points = usize::from(flags & ((1 << POINTS_BITS) - 1));
         let parts = usize::from(flags >> POINTS_BITS & ((1 << (MARKS - POINTS_BITS)) - 1));
         let (is_promised, with_axes) = (flags >> MARKS & 1 == 1, flags >> (MARKS + 1) == 1);
-        let (most_atoms, most_parts) = if dim == 0 { (0, 0) } else { (MAX_ATOMS, REST_PARTS) };
-        let least_of = |most: usize| most.min(1);
-        must((least_of(most_atoms)..=most_atoms).contains(&atoms), || {
-            format!("'m' is {atoms}, not from {} to {most_atoms}", least_of(most_atoms))
+        let (fewest, most_atoms, most_parts) = if dim == 0 { (0, 0, 0) } else { (1, MAX_ATOMS, REST_PARTS) };
+        must((fewest..=most_atoms).contains(&atoms), || {
+            format!("'m' is {atoms}, not from {fewest} to {most_atoms}")
         })?;
-        must((least_of(most_parts)..=most_parts).contains(&parts), || {
-            format!("'flags': P is {parts}, not from {} to {most_parts}", least_of(most_parts))
+        must((fewest..=most_parts).contains(&parts), || {
+            format!("'flags': P is {parts}, not from {fewest} to {most_parts}")
         })?;
         must(!with_axes || (dim > 0 && atoms >= dim), || {
             format!("'flags': 'fixed' needs at least {} atoms, and m is {atoms}", dim.max(1))

@@ -55,7 +55,7 @@ impl MeanView {
         let mut distances: Vec<f32> = points.iter().map(far).collect();
         distances.sort_by(f32::total_cmp);
         let softening = SOFTENING * at_share(&distances, 0.5);
-        Self { softening: softening.clamp(LEAST_SOFTENING, *SOFTENINGS.end()), points }
+        Self { softening: softening.max(LEAST_SOFTENING).min(*SOFTENINGS.end()), points }
     }
 
     /// Returns the average of each basis function over the directions from all points to `position`, divided by the basis

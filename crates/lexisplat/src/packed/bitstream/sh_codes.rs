@@ -182,7 +182,7 @@ impl Rest {
         form: &RestForm,
         part: usize,
     ) -> Result<(), Broken> {
-        let Some(&least) = form.least.get(part) else { return Ok(()) };
+        let least = *form.least.get(part).ok_or(Broken("is a part that the head does not have"))?;
         let most =
             part.checked_sub(1).and_then(|before| form.least.get(before)).map_or(MAX_SIZE, |&most| most);
         // The nonzeros of each lane that belong to this part.

@@ -5,6 +5,7 @@
 //! symbols that change after every bit. All products are below 2^32.
 
 use crate::packed::bitstream::broken::{BrokenHead, must};
+use crate::packed::entropy::rans_encoder::{LEAST as LEAST_STATE, Stack};
 use crate::packed::entropy::tables::Model;
 
 /// Number of bits of a probability.
@@ -13,12 +14,6 @@ const PRECISION: u32 = 12;
 const LEAST: u16 = 48;
 /// Shifts of the distance from certainty: after each of the first bits, and after all later bits.
 const RATES: [u32; 6] = [1, 2, 3, 4, 4, 5];
-/// Least value of a state between two bits. A state takes a word of 16 bits when it falls below. The encoder starts from
-/// it, so a decoder ends with it.
-const LEAST_STATE: u32 = 1 << 16;
-/// Number of bits of a word.
-const WORD_BITS: u32 = 16;
-
 /// The probability one half.
 const HALF: u16 = 1 << (PRECISION - 1);
 
@@ -108,18 +103,9 @@ pub(in crate::packed) struct BitEncoder {
 impl BitEncoder {
     /// Returns the bytes: words of 16 bits, the first two of which are the state that a decoder starts with.
     pub(in crate::packed) fn finish(self) -> Vec<u8> {
-        let mut state = LEAST_STATE;
-        let mut words: Vec<u16> = Vec::new();
-        for &(zero, bit) in self.steps.iter().rev() {
-            let Model { start, share } = model(zero, bit);
-            if state >> (u32::BITS - PRECISION) >= share {
-                words.push(low_word(state));
-                state >>= WORD_BITS;
-            }
-            state = ((state / share) << PRECISION) + start + state % share;
-        }
-        words.extend([low_word(state), low_word(state >> WORD_BITS)]);
-        words.iter().rev().flat_map(|word| word.to_le_bytes()).collect()
+        let mut stack = Stack::new();
+        self.steps.iter().rev().for_each(|&(zero, bit)| stack.symbol(model(zero, bit), PRECISION));
+        stack.finish().iter().flat_map(|word| word.to_le_bytes()).collect()
     }
 }
 
@@ -130,11 +116,6 @@ fn model(zero: u16, bit: bool) -> Model {
         false => Model { start: 0, share: zero },
         true => Model { start: zero, share: (1 << PRECISION) - zero },
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "the low word is meant")]
-fn low_word(state: u32) -> u16 {
-    state as u16
 }
 
 impl Bits for BitEncoder {
@@ -158,7 +139,7 @@ impl<'a> BitDecoder<'a> {
         let (words, rest) = bytes.as_chunks();
         let mut decoder = Self { words: words.iter(), state: 0, broken: None };
         let [high, low] = [decoder.word(), decoder.word()];
-        decoder.state = high << WORD_BITS | low;
+        decoder.state = high << 16 | low;
         if !rest.is_empty() {
             decoder.broken = Some("half a word is at the end");
         } else if decoder.state < LEAST_STATE {
@@ -193,7 +174,7 @@ impl Bits for BitDecoder<'_> {
         let Model { start, share } = model(zero, bit);
         self.state = (self.state >> PRECISION) * share + low - start;
         if self.state < LEAST_STATE {
-            self.state = self.state << WORD_BITS | self.word();
+            self.state = self.state << 16 | self.word();
         }
         bit
     }

@@ -12,8 +12,6 @@ pub(in crate::packed) const MAX_SYMBOLS: usize = 256;
 const COUNT_BITS: usize = 9;
 /// Number of bits of the level of the first symbol.
 const FIRST_BITS: u32 = 5;
-/// Largest difference of levels that the encoder tries.
-const MOST_DELTA: usize = 24;
 
 /// A table: for each symbol its level, and whether the symbol occurs. The last symbol always occurs. A symbol that does not
 /// occur has the level of the symbol before.
@@ -150,8 +148,7 @@ impl<'a> Fit<'a> {
         if self.counts[i] == 0 && i + 1 == self.counts.len() {
             best.0 = f32::INFINITY;
         }
-        let range = before.saturating_sub(MOST_DELTA)..(before + MOST_DELTA + 1).min(self.levels);
-        for level in range {
+        for level in 0..self.levels {
             let bits = self.bits[i][level][1] + OCCURS[there][1] + delta_bits(level.abs_diff(before));
             if bits < best.0 {
                 best = (bits, level, true);

@@ -121,34 +121,61 @@ impl SymbolRecorder {
     }
 }
 
+/// The state of a lane, and the words that left it. The coder is a stack: the last symbol that is encoded is the first to be
+/// decoded.
+#[derive(Debug)]
+pub(in crate::packed) struct Stack {
+    state: u32,
+    words: Vec<u16>,
+}
+
+impl Stack {
+    pub(in crate::packed) fn new() -> Self {
+        Self { state: LEAST, words: Vec::new() }
+    }
+
+    /// Moves a word out of the state if it is not below `limit`.
+    fn make_room(&mut self, limit: u64) {
+        if u64::from(self.state) >= limit {
+            self.words.push((self.state & 0xffff) as u16);
+            self.state >>= 16;
+        }
+    }
+
+    /// Encodes a symbol whose probability has `precision` bits.
+    pub(in crate::packed) fn symbol(&mut self, Model { start, share }: Model, precision: u32) {
+        self.make_room(u64::from(share) << (u32::BITS - precision));
+        self.state = ((self.state / share) << precision) + start + self.state % share;
+    }
+
+    /// Encodes `count` raw bits.
+    fn raw(&mut self, count: u32, bits: u32) {
+        self.make_room(1 << (u32::BITS - count));
+        self.state = self.state << count | bits;
+    }
+
+    /// Returns the words in the order in which they are read. The first two are the state.
+    pub(in crate::packed) fn finish(mut self) -> Vec<u16> {
+        self.words.push((self.state & 0xffff) as u16);
+        self.words.push((self.state >> 16) as u16);
+        self.words.reverse();
+        self.words
+    }
+}
+
 /// Encodes a lane. Returns its words in the order in which they are read.
 fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
-    let mut words = Vec::new();
-    let mut state = LEAST;
-    let mut make_room = |state: &mut u32, limit: u64| {
-        if u64::from(*state) >= limit {
-            words.push((*state & 0xffff) as u16);
-            *state >>= 16;
-        }
-    };
-    // The coder is a stack: the last symbol that is encoded is the first to be decoded.
+    let mut stack = Stack::new();
     for &entry in lane.iter().rev() {
         if entry & RAW == 0 {
             let context = (entry >> 8) as usize;
             let precision = Slot::stream_of(context).precision();
-            let Model { start, share } = tables.model(context, entry.to_le_bytes()[0]);
-            make_room(&mut state, u64::from(share) << (32 - precision));
-            state = ((state / share) << precision) + start + state % share;
+            stack.symbol(tables.model(context, entry.to_le_bytes()[0]), precision);
         } else {
-            let count = entry >> 16 & 0xff;
-            make_room(&mut state, 1 << (32 - count));
-            state = state << count | entry & 0xffff;
+            stack.raw(entry >> 16 & 0xff, entry & 0xffff);
         }
     }
-    words.push((state & 0xffff) as u16);
-    words.push((state >> 16) as u16);
-    words.reverse();
-    words
+    stack.finish()
 }
 
 #[cfg(test)]
