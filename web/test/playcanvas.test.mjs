@@ -115,7 +115,7 @@ test('on the GPU are a code word and geometry a Gaussian, a word a nonzero, and 
   scene.close();
   await viewer.call('show', '/golden/packed3_layers.lexi');
   const geometry = 4 * 4 + 4 * 2 + 4 * 2;
-  const atom = 15 * 4 * 2;
+  const atom = ((scene.header.degree + 1) ** 2 - 1) * 4 * 2;
   const needed = (geometry + 4) * count + 4 * codes.indices.length + atom * scene.header.atoms;
   const bytes = await viewer.call('bytes');
   // Textures have whole rows.
