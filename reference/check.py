@@ -75,7 +75,7 @@ class File:
         for _ in range(3 * interim):
             varint()
         grid = struct.unpack_from("<8f4h", head, at)
-        at += 32 + 8 + (4 + 12 * points if points else 0) + 15
+        at += 32 + 8 + (4 + 9 * points if points else 0) + 15
         for _ in range(3):
             length = varint()
             at += length

@@ -1125,14 +1125,15 @@ static const unsigned char *lexi__bytes(lexi__cursor *c, const char *field, size
     return c->p - n;
 }
 
-static uint32_t lexi__fixed(lexi__cursor *c, const char *field, size_t n) { /* of 1, 2 or 4 bytes */
+static uint32_t lexi__fixed(lexi__cursor *c, const char *field, size_t n) { /* of 1 to 4 bytes */
     const unsigned char *p = lexi__bytes(c, field, n);
-    return !p ? 0 : n == 1 ? p[0] : n == 2 ? lexi__u16(p) : lexi__u32(p);
+    uint32_t x = 0;
+    for (size_t k = p ? n : 0; k; k--) x = x << 8 | p[k - 1];
+    return x;
 }
 
-static float lexi__real(lexi__cursor *c, const char *field, size_t n) { /* an f32, or a bf16 of 2 bytes */
-    uint32_t bits = lexi__fixed(c, field, n);
-    float x = lexi__float(n == 2 ? bits << 16 : bits);
+static float lexi__real(lexi__cursor *c, const char *field, size_t n) { /* an f32, or the n high bytes of one */
+    float x = lexi__float(lexi__fixed(c, field, n) << (32 - 8 * n));
     if (!lexi__finite(x)) { lexi__bad(c, field, "is not finite"); return 0; }
     return x;
 }
@@ -1474,7 +1475,7 @@ static int lexi__open_packed(lexi__call *call, lexi_file *f) {
     if (h->points) h->softening = lexi__real(&c, "softening", 4);
     if (!c.why && h->points && (h->softening < ldexp(1, -60) || h->softening > ldexp(1, 60)))
         return lexi__refuse(call, "packed.head", "softening is not from 2^-60 to 2^60");
-    for (int k = 0; k < 3 * h->points; k++) h->point[k / 3][k % 3] = lexi__real(&c, "points", 4);
+    for (int k = 0; k < 3 * h->points; k++) h->point[k / 3][k % 3] = lexi__real(&c, "points", 3);
     for (int k = 0; k < 5; k++) {
         h->mantissa[k] = lexi__fixed(&c, "steps", 2);
         h->shift[k] = (int)(lexi__fixed(&c, "steps", 1) ^ 0x80) - 0x80;

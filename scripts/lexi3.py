@@ -66,12 +66,15 @@ class Bytes:
     def f32(self, n):
         return self.floats([self.take(4) for _ in range(n)])
 
+    def f24(self, n):
+        return self.floats([bytes(1) + self.take(3) for _ in range(n)])
+
     def bf16(self, n):
         return self.floats([bytes(2) + self.take(2) for _ in range(n)])
 
     def floats(self, pieces):
         values = [struct.unpack("<f", x)[0] for x in pieces]
-        check(all(map(math.isfinite, values)), "an f32 or bf16 of packed.head is not finite")
+        check(all(map(math.isfinite, values)), "an f32, f24 or bf16 of packed.head is not finite")
         return values
 
     def end(self):
@@ -269,7 +272,7 @@ class Head:
         self.dc_axes = axes_of(*turn)
         self.softening = b.f32(1)[0] if views else 1.0
         check(2.0 ** -60 <= self.softening <= 2.0 ** 60, "softening is not from 2^-60 to 2^60")
-        self.points = np.array(b.f32(3 * views)).reshape(views, 3)
+        self.points = np.array(b.f24(3 * views)).reshape(views, 3)
         steps = [b.unpack("Hb") for _ in range(5)]
         check(all(-6 <= h <= 31 for _, h in steps), "the shift of a step is not from -6 to 31")
         self.steps = np.array([[min(max(M << min(c - h, 6) if c >= h else M >> h - c, 1), 3 << 19) for c in range(16)]
