@@ -30,8 +30,10 @@ BUILD = "cc -std=c99 -Wall -Wextra -Werror -pedantic -O1 -g -fsanitize=address,u
 TYPES = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
          "double": "<f8"}
 ODD = ["", "0", "1", "-1", "-0", "01", "+1", "1.5", "1e3", "1e400", "1e-400", " 1", "256", "4294967295",
-       "18446744073709551615", "18446744073709551616", "NaN", "true", "false", "null", "[]", "{}", "[1,2,3]", "[1,2]",
-       '["a"]', '{"a":1,"a":2}', '{"a":1}', "lexi", "packed", "f16", "paper", "x" * 300, "\u00e9\u2028", "[" * 40]
+       "18446744073709551615", "18446744073709551616", "3e2", "0e0", "NaN", "true", "false", "null", "[]", "{}",
+       "[1,2,3]", "[1,2]", '["a"]', '{"a":1,"a":2}', '{"a":1}', "lexi", "packed", "f16", "paper", "x" * 300, "\u00e9\u2028", "[" * 40,
+       *("[" * n + "]" * n for n in (32, 33))]
+DTYPES = ["U8", "I8", "F32", "F64", "BOOL", "BF16", "u8", "F4", "F8_E5M2", "C64", ""]
 NAMES = ["x-a", "x-", "extra.a", "extra.x", "extra.f_rest_7", "extra.\u2003", "extra.", "y", "normal"]
 KNOWN = r"lexi_tool: tensor (packed\.(data|order)|extra\..*): its (dtype|shape)"
 
@@ -143,6 +145,7 @@ def mutated(data, random):
                 if random.randrange(5) == 0:
                     metadata.pop(key, None)
                 else:
+                    near += [old[:1] + f'"x":{"[" * n}{"]" * n},' + old[1:] for n in (31, 32) if old[:1] == "{"]
                     old = metadata.get(key, "1")
                     near = [old + " ", old[:-1], old.replace("1", "2"), old.replace(":", ":1"), old.upper()]
                     metadata[key] = random.choice(ODD + near)
@@ -151,7 +154,7 @@ def mutated(data, random):
                 entry = file.header[name]
                 what = random.randrange(8)
                 if what == 0:
-                    entry["dtype"] = random.choice(["U8", "I8", "F32", "F64", "BOOL", "BF16", "u8", "F4", ""])
+                    entry["dtype"] = random.choice(DTYPES)
                 elif what == 1:
                     shape = entry["shape"]
                     entry["shape"] = random.choice([[], [0], shape + [1], [1] + shape, shape[::-1], [2**63, 2]])
@@ -160,9 +163,10 @@ def mutated(data, random):
                 elif what == 3:
                     file.header[random.choice(NAMES)] = file.header.pop(name)
                 elif what == 4:
-                    file.header[random.choice(NAMES)] = {"dtype": "U8", "shape": [0], "data_offsets": [0, 0]}
+                    new = {"dtype": random.choice(DTYPES), "shape": [0], "data_offsets": [0, 0]}
+                    file.header[random.choice(NAMES)] = new
                 elif what == 5:
-                    entry["more"] = 1
+                    entry["more"] = random.choice([1, json.loads("[" * 30 + "]" * 30), json.loads("[" * 31 + "]" * 31)])
                 elif what == 6:
                     file.header = dict(sorted(file.header.items(), key=lambda _: random.random()))
                 else:

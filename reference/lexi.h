@@ -435,12 +435,15 @@ static void lexi__free_json(lexi__json *j) {
 }
 
 /* The rule that a text breaks, or NULL. The text is copied before. */
+enum { LEXI__DEPTH = 32 }; /* of arrays and objects of JSON within one another: "Container" */
+
 static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, int *failed) {
     enum { VALUE, VALUE_OR_END, KEY, KEY_OR_END, COLON, AFTER } want = VALUE;
     const uint32_t none = UINT32_MAX;
     uint32_t open = none;
     size_t at = 0;
     char *t = j->text;
+    int depth = 0;
     for (;;) {
         while (at < n && (t[at] == ' ' || t[at] == '\t' || t[at] == '\n' || t[at] == '\r')) at++;
         if (want == AFTER && open == none) return at == n ? NULL : "something follows the JSON";
@@ -451,6 +454,7 @@ static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, 
             j->nodes[open].next = (uint32_t)j->count;
             open = j->nodes[open].parent;
             want = AFTER;
+            depth--;
             at++;
         } else if (want == AFTER) {
             if (c != ',') return "there is no comma where one is needed";
@@ -478,6 +482,7 @@ static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, 
                 if ((why = lexi__string(t, n, &at, &node->length)) != NULL) return why;
             } else if (c == '{' || c == '[') {
                 open = (uint32_t)j->count - 1;
+                if (++depth > LEXI__DEPTH) return "its arrays and objects are more than 32 deep";
                 want = c == '{' ? KEY_OR_END : VALUE_OR_END;
                 at++;
             } else if (n - at >= strlen(word) && !memcmp(t + at, word, strlen(word))) at += strlen(word);
@@ -607,11 +612,10 @@ struct lexi_file {
     int16_t table_of[61][24];
 };
 
-/* Types of safetensors; the first ones are numbered as in coded columns. */
-static const char lexi__types[][12] = {
-    "I8", "U8", "I16", "U16", "I32", "U32", "F32", "F64", "F16", "BOOL", "BF16", "I64", "U64", "F8_E5M2", "F8_E4M3",
-    "F8_E8M0", "F8_E4M3FNUZ", "F8_E5M2FNUZ", "C64", "F4", "F6_E2M3", "F6_E3M2"};
-static const unsigned lexi__type_bits[] = {8, 8, 16, 16, 32, 32, 32, 64, 16, 8, 16, 64, 64, 8, 8, 8, 8, 8, 64, 4, 6, 6};
+/* Types of tensors; the first ones are numbered as in coded columns. */
+static const char lexi__types[][5] = {"I8",  "U8",  "I16",  "U16",  "I32", "U32", "F32",
+                                      "F64", "F16", "BOOL", "BF16", "I64", "U64"};
+static const unsigned lexi__type_bytes[] = {1, 1, 2, 2, 4, 4, 4, 8, 2, 1, 2, 8, 8};
 enum { LEXI__U8 = 1, LEXI__U16 = 3, LEXI__I32 = 4, LEXI__U32 = 5, LEXI__F32 = 6, LEXI__F16 = 8 };
 
 static lexi__call lexi__begin_call(const lexi_file *f, lexi_error *error) {
@@ -645,14 +649,14 @@ static int lexi__begins(lexi__text name, const char *word) {
 static int lexi__read_tensor(lexi__call *call, const lexi__json *j, size_t node, lexi__tensor *t) {
     size_t type = lexi__member(j, node, "dtype"), shape = lexi__member(j, node, "shape"), i;
     size_t offsets = lexi__member(j, node, "data_offsets");
-    uint64_t x, bits;
+    uint64_t x, width;
     const char *rule = "its entry has no string dtype, list shape or pair data_offsets";
     t->name = lexi__node_text(j, node - 1);
     if (!type || !shape || !offsets || j->nodes[type].kind != '"' || j->nodes[shape].kind != '[' ||
         j->nodes[offsets].kind != '[' || j->nodes[offsets].next != offsets + 3)
         return lexi__named(call, "tensor ", t->name.s, t->name.n, rule);
     for (t->type = 0; !lexi__is(lexi__node_text(j, type), lexi__types[t->type]);)
-        if (++t->type == (int)(sizeof lexi__type_bits / sizeof *lexi__type_bits))
+        if (++t->type == (int)(sizeof lexi__type_bytes / sizeof *lexi__type_bytes))
             return lexi__named(call, "tensor ", t->name.s, t->name.n, "its dtype is unknown");
     t->count = 1;
     for (i = shape + 1; i < j->nodes[shape].next; i++, t->rank++) {
@@ -663,11 +667,11 @@ static int lexi__read_tensor(lexi__call *call, const lexi__json *j, size_t node,
         t->count *= x;
         if (t->rank < 2) t->shape[t->rank] = x;
     }
-    bits = lexi__type_bits[t->type];
+    width = lexi__type_bytes[t->type];
     if (j->nodes[offsets + 1].kind != '0' || j->nodes[offsets + 2].kind != '0' ||
         !lexi__integer_of(lexi__node_text(j, offsets + 1), UINT64_MAX, &t->begin) ||
         !lexi__integer_of(lexi__node_text(j, offsets + 2), UINT64_MAX, &t->end) || t->end < t->begin ||
-        t->count > UINT64_MAX / bits || t->count * bits % 8 || t->end - t->begin != t->count * bits / 8)
+        t->count > UINT64_MAX / width || t->end - t->begin != t->count * width)
         return lexi__named(call, "tensor ", t->name.s, t->name.n, "its data_offsets do not hold its shape");
     return 1;
 }
@@ -902,7 +906,7 @@ static int lexi__is_property(lexi__text t) {
 /* Bytes of a value of a coded column, 0 if its type is unknown or not there. */
 static size_t lexi__column_width(const lexi_file *f, const lexi__tensor *t) {
     unsigned type = t->end > t->begin && lexi__is_there(f, t) ? lexi__data(f, t)[0] : 8;
-    return type < 8 ? lexi__type_bits[type] / 8 : 0;
+    return type < 8 ? lexi__type_bytes[type] : 0;
 }
 
 /* Take the tensor of a name. Its type and shape have to be these; the second number is 0 for a shape of one. */
@@ -2437,7 +2441,7 @@ int lexi_decode_extra(lexi_file *f, size_t index, lexi_extra *extra, lexi_error 
     if (!lexi__all_there(f, t)) return 1;
     if (f->info.packed) return lexi__column(&call, f, t, &extra->type, &extra->width, &extra->values);
     extra->type = t->type;
-    extra->width = (int)lexi__type_bits[t->type] / 8;
+    extra->width = (int)lexi__type_bytes[t->type];
     if (!lexi__resize(&call, &extra->values, 0, t->end - t->begin, 1)) return 0;
     memcpy(extra->values, lexi__data(f, t), (size_t)(t->end - t->begin));
     return 1;

@@ -19,9 +19,9 @@ from lexi3 import LexiError, check
 F = np.float32
 MAX_HEADER = 4 << 20
 PACKED = NEWEST = 3
-DTYPES = {"BOOL": "u1", "U8": "u1", "I8": "i1", "F8_E5M2": "u1", "F8_E4M3": "u1", "I16": "<i2", "U16": "<u2",
-          "F16": "<f2", "BF16": "<u2", "I32": "<i4", "U32": "<u4", "F32": "<f4", "F64": "<f8", "I64": "<i8",
-          "U64": "<u8"}
+MAX_DEPTH = 32
+DTYPES = {"BOOL": "u1", "I8": "i1", "U8": "u1", "I16": "<i2", "U16": "<u2", "F16": "<f2", "BF16": "<u2", "I32": "<i4",
+          "U32": "<u4", "F32": "<f4", "I64": "<i8", "U64": "<u8", "F64": "<f8"}
 EXTRA_TYPES = ("I8", "U8", "I16", "U16", "I32", "U32", "F32", "F64")
 # These are the properties of 3DGS, which an extra must not be called. Normals may be extras.
 RESERVED = re.compile(r"x|y|z|opacity|f_dc_[0-2]|f_rest_[0-9]+|scale_[0-2]|rot_[0-3]")
@@ -58,6 +58,11 @@ def parse_json(text):
         value = json.loads(text, object_pairs_hook=members, parse_constant=constant, parse_int=integer)
         json.dumps(value, ensure_ascii=False).encode()          # refuses lone surrogates
         return value
+        inner = [value]
+        for _ in range(MAX_DEPTH + 1):
+            outer = [v for v in inner if isinstance(v, (dict, list))]
+            inner = [v for o in outer for v in (o.values() if isinstance(o, dict) else o)]
+        check(not outer, "arrays and objects of JSON are more than 32 deep")
     except (ValueError, RecursionError) as e:
         raise LexiError(f"bad JSON: {e}") from e
 
