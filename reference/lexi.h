@@ -85,7 +85,7 @@ typedef struct lexi_info {
     size_t chunk_count;
     lexi_chunk *chunks;          /* only `bytes` of ranges may be changed */
     size_t extra_count;          /* per-Gaussian properties that 3DGS does not define */
-    int has_order;               /* whether lexi_restore_order does something */
+    int has_order;               /* whether lexi_restore_order does something: not in a first part */
 } lexi_info;
 
 /* Gaussians. Arrays have `count` rows. SH-rest is channel-major like f_rest_*. */
@@ -131,7 +131,8 @@ void lexi_free_scene(lexi_scene *scene);
 /* Bring the Gaussians of a whole file, and their extras, into the order of the source. */
 int lexi_restore_order(lexi_file *file, lexi_scene *scene, lexi_extra *extras, size_t extra_count, lexi_error *error);
 
-/* Decode an extra, from 0 to extra_count - 1. Where `values` is NULL afterwards, it is missing in this first part. */
+/* Decode an extra, from 0 to extra_count - 1. `values` is NULL afterwards if this is a first part of a file, which has
+   no extras. */
 int lexi_decode_extra(lexi_file *file, size_t index, lexi_extra *extra, lexi_error *error);
 void lexi_free_extra(lexi_extra *extra);
 
@@ -434,16 +435,16 @@ static void lexi__free_json(lexi__json *j) {
     memset(j, 0, sizeof *j);
 }
 
-/* The rule that a text breaks, or NULL. The text is copied before. */
 enum { LEXI__DEPTH = 32 }; /* of arrays and objects of JSON within one another: "Container" */
 
+/* The rule that a text breaks, or NULL. The text is copied before. */
 static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, int *failed) {
     enum { VALUE, VALUE_OR_END, KEY, KEY_OR_END, COLON, AFTER } want = VALUE;
     const uint32_t none = UINT32_MAX;
     uint32_t open = none;
     size_t at = 0;
-    char *t = j->text;
     int depth = 0;
+    char *t = j->text;
     for (;;) {
         while (at < n && (t[at] == ' ' || t[at] == '\t' || t[at] == '\n' || t[at] == '\r')) at++;
         if (want == AFTER && open == none) return at == n ? NULL : "something follows the JSON";
@@ -453,8 +454,8 @@ static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, 
             (c == ']' && kind == '[' && (want == VALUE_OR_END || want == AFTER))) {
             j->nodes[open].next = (uint32_t)j->count;
             open = j->nodes[open].parent;
-            want = AFTER;
             depth--;
+            want = AFTER;
             at++;
         } else if (want == AFTER) {
             if (c != ',') return "there is no comma where one is needed";
@@ -481,8 +482,8 @@ static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, 
             else if (c == '"') {
                 if ((why = lexi__string(t, n, &at, &node->length)) != NULL) return why;
             } else if (c == '{' || c == '[') {
-                open = (uint32_t)j->count - 1;
                 if (++depth > LEXI__DEPTH) return "its arrays and objects are more than 32 deep";
+                open = (uint32_t)j->count - 1;
                 want = c == '{' ? KEY_OR_END : VALUE_OR_END;
                 at++;
             } else if (n - at >= strlen(word) && !memcmp(t + at, word, strlen(word))) at += strlen(word);
@@ -1424,7 +1425,7 @@ static int lexi__open_packed(lexi__call *call, lexi_file *f) {
         (order && !lexi__take(call, f, "packed.order", LEXI__U8, order->shape[0], 0, &order)) ||
         !lexi__check_names(call, f))
         return 0;
-    f->info.has_order = order != NULL;
+    f->info.has_order = order && f->size == f->whole;
     if (!lexi__is_there(f, head)) return lexi__refuse(call, "tensor packed.head", "it is not there as a whole");
     lexi__cursor c = {lexi__data(f, head), lexi__data(f, head) + (size_t)(head->end - head->begin), NULL, NULL};
     uint32_t crc = lexi__fixed(&c, "CRC-32", 4);
@@ -2425,12 +2426,6 @@ static int lexi__column(lexi__call *call, const lexi_file *f, const lexi__tensor
     return ok;
 }
 
-/* Whether all Gaussians are there, and a tensor for all of them too. */
-static int lexi__all_there(const lexi_file *f, const lexi__tensor *t) {
-    for (size_t i = 0; f->info.packed && i < f->info.chunk_count; i++) if (!f->chunks[i].range[0].bytes) return 0;
-    return lexi__is_there(f, t);
-}
-
 int lexi_decode_extra(lexi_file *f, size_t index, lexi_extra *extra, lexi_error *error) {
     lexi__call call = lexi__begin_call(f, error);
     memset(extra, 0, sizeof *extra);
@@ -2438,7 +2433,7 @@ int lexi_decode_extra(lexi_file *f, size_t index, lexi_extra *extra, lexi_error 
     const lexi__tensor *t = &f->tensors[f->extras[index]];
     extra->name = t->name.s + 6;
     extra->name_length = t->name.n - 6;
-    if (!lexi__all_there(f, t)) return 1;
+    if (f->size < f->whole) return 1;
     if (f->info.packed) return lexi__column(&call, f, t, &extra->type, &extra->width, &extra->values);
     extra->type = t->type;
     extra->width = (int)lexi__type_bytes[t->type];
@@ -2473,7 +2468,7 @@ int lexi_restore_order(lexi_file *f, lexi_scene *s, lexi_extra *extras, size_t e
     unsigned char *values = NULL, *seen = NULL;
     uint32_t *order = NULL;
     int type, width, ok = 1;
-    if (!t || !lexi__all_there(f, t)) return 1;
+    if (!t || f->size < f->whole) return 1;
     if (n != f->info.gaussians) return lexi__misuse(&call, "scene", "it has not all Gaussians of the file");
     if (!lexi__column(&call, f, t, &type, &width, &values)) return 0;
     if (type != LEXI__U32)

@@ -696,10 +696,6 @@ def decode_ranges(head, data, trace=None):
     n, chunks = int(head.first[-1]), range(len(head.count))
     out, sums = Integers(n), {}
     whole = {key for key, (start, length, *_) in head.ranges.items() if start + length <= len(data)}
-    for key in whole:
-        start, length, crc, _ = head.ranges[key]
-        check(zlib.crc32(data[start:start + length]) == crc, f"range {key} is damaged")
-
     def run(kind_of, decoder, row_of, set_of=lambda c: 0):
         """Decode the range of kind kind_of(c) of every chunk c that has it and all that it needs."""
         keys = [(c, kind_of(c)) for c in chunks if kind_of(c) is not None and needs(c, kind_of(c)) <= whole]
@@ -719,6 +715,10 @@ def decode_ranges(head, data, trace=None):
         R = head.refinements[c]
         first = 1 if kind <= R else R + 1 if kind <= R + head.parts else kind
         return {(c, 0), *((c, k) for k in range(first, kind + 1))}
+
+    for key in whole:
+        start, length, crc, _ = head.ranges[key]
+        check(not needs(*key) <= whole or zlib.crc32(data[start:start + length]) == crc, f"range {key} is damaged")
 
     def rows(*variables):
         values = np.vstack(variables).T
