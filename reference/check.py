@@ -29,8 +29,8 @@ TYPES = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<
          "double": "<f8"}
 ODD = ["", "0", "1", "-1", "-0", "01", "+1", "1.5", "1e3", "1e400", "1e-400", " 1", "256", "4294967295",
        "18446744073709551615", "18446744073709551616", "3e2", "0e0", "NaN", "true", "false", "null", "[]", "{}",
-       "[1,2,3]", "[1,2]", '["a"]', '{"a":1,"a":2}', '{"a":1}', "lexi", "packed", "f16", "paper", "x" * 300, "\u00e9\u2028", "[" * 40,
-       *("[" * n + "]" * n for n in (32, 33))]
+       "[1,2,3]", "[1,2]", '["a"]', '{"a":1,"a":2}', '{"a":1}', "lexi", "packed", "f16", "paper", "x" * 300,
+       "\u00e9\u2028", "[" * 40, *("[" * n + "]" * n for n in (32, 33))]
 DTYPES = ["U8", "I8", "F32", "F64", "BOOL", "BF16", "u8", "F4", "F8_E5M2", "C64", ""]
 NAMES = ["x-a", "x-", "extra.a", "extra.x", "extra.f_rest_7", "extra.\u2003", "extra.", "y", "normal"]
 EMPTY = "no Gaussian is whole in the first part"      # what the program says of a scene of no Gaussians
