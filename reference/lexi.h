@@ -85,7 +85,7 @@ typedef struct lexi_info {
     size_t chunk_count;
     lexi_chunk *chunks;          /* only `bytes` of ranges may be changed */
     size_t extra_count;          /* per-Gaussian properties that 3DGS does not define */
-    int has_order;               /* whether lexi_restore_order does something */
+    int has_order;               /* whether lexi_restore_order does something: not in a first part */
 } lexi_info;
 
 /* Gaussians. Arrays have `count` rows. SH-rest is channel-major like f_rest_*. */
@@ -131,7 +131,8 @@ void lexi_free_scene(lexi_scene *scene);
 /* Bring the Gaussians of a whole file, and their extras, into the order of the source. */
 int lexi_restore_order(lexi_file *file, lexi_scene *scene, lexi_extra *extras, size_t extra_count, lexi_error *error);
 
-/* Decode an extra, from 0 to extra_count - 1. Where `values` is NULL afterwards, it is missing in this first part. */
+/* Decode an extra, from 0 to extra_count - 1. `values` is NULL afterwards if this is a first part of a file, which has
+   no extras. */
 int lexi_decode_extra(lexi_file *file, size_t index, lexi_extra *extra, lexi_error *error);
 void lexi_free_extra(lexi_extra *extra);
 
@@ -434,12 +435,15 @@ static void lexi__free_json(lexi__json *j) {
     memset(j, 0, sizeof *j);
 }
 
+enum { LEXI__DEPTH = 32 }; /* of arrays and objects of JSON within one another: "Container" */
+
 /* The rule that a text breaks, or NULL. The text is copied before. */
 static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, int *failed) {
     enum { VALUE, VALUE_OR_END, KEY, KEY_OR_END, COLON, AFTER } want = VALUE;
     const uint32_t none = UINT32_MAX;
     uint32_t open = none;
     size_t at = 0;
+    int depth = 0;
     char *t = j->text;
     for (;;) {
         while (at < n && (t[at] == ' ' || t[at] == '\t' || t[at] == '\n' || t[at] == '\r')) at++;
@@ -450,6 +454,7 @@ static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, 
             (c == ']' && kind == '[' && (want == VALUE_OR_END || want == AFTER))) {
             j->nodes[open].next = (uint32_t)j->count;
             open = j->nodes[open].parent;
+            depth--;
             want = AFTER;
             at++;
         } else if (want == AFTER) {
@@ -477,6 +482,7 @@ static const char *lexi__parse_nodes(lexi__call *call, lexi__json *j, size_t n, 
             else if (c == '"') {
                 if ((why = lexi__string(t, n, &at, &node->length)) != NULL) return why;
             } else if (c == '{' || c == '[') {
+                if (++depth > LEXI__DEPTH) return "its arrays and objects are more than 32 deep";
                 open = (uint32_t)j->count - 1;
                 want = c == '{' ? KEY_OR_END : VALUE_OR_END;
                 at++;
@@ -607,11 +613,10 @@ struct lexi_file {
     int16_t table_of[61][24];
 };
 
-/* Types of safetensors; the first ones are numbered as in coded columns. */
-static const char lexi__types[][12] = {
-    "I8", "U8", "I16", "U16", "I32", "U32", "F32", "F64", "F16", "BOOL", "BF16", "I64", "U64", "F8_E5M2", "F8_E4M3",
-    "F8_E8M0", "F8_E4M3FNUZ", "F8_E5M2FNUZ", "C64", "F4", "F6_E2M3", "F6_E3M2"};
-static const unsigned lexi__type_bits[] = {8, 8, 16, 16, 32, 32, 32, 64, 16, 8, 16, 64, 64, 8, 8, 8, 8, 8, 64, 4, 6, 6};
+/* Types of tensors; the first ones are numbered as in coded columns. */
+static const char lexi__types[][5] = {"I8",  "U8",  "I16",  "U16",  "I32", "U32", "F32",
+                                      "F64", "F16", "BOOL", "BF16", "I64", "U64"};
+static const unsigned lexi__type_bytes[] = {1, 1, 2, 2, 4, 4, 4, 8, 2, 1, 2, 8, 8};
 enum { LEXI__U8 = 1, LEXI__U16 = 3, LEXI__I32 = 4, LEXI__U32 = 5, LEXI__F32 = 6, LEXI__F16 = 8 };
 
 static lexi__call lexi__begin_call(const lexi_file *f, lexi_error *error) {
@@ -645,14 +650,14 @@ static int lexi__begins(lexi__text name, const char *word) {
 static int lexi__read_tensor(lexi__call *call, const lexi__json *j, size_t node, lexi__tensor *t) {
     size_t type = lexi__member(j, node, "dtype"), shape = lexi__member(j, node, "shape"), i;
     size_t offsets = lexi__member(j, node, "data_offsets");
-    uint64_t x, bits;
+    uint64_t x, width;
     const char *rule = "its entry has no string dtype, list shape or pair data_offsets";
     t->name = lexi__node_text(j, node - 1);
     if (!type || !shape || !offsets || j->nodes[type].kind != '"' || j->nodes[shape].kind != '[' ||
         j->nodes[offsets].kind != '[' || j->nodes[offsets].next != offsets + 3)
         return lexi__named(call, "tensor ", t->name.s, t->name.n, rule);
     for (t->type = 0; !lexi__is(lexi__node_text(j, type), lexi__types[t->type]);)
-        if (++t->type == (int)(sizeof lexi__type_bits / sizeof *lexi__type_bits))
+        if (++t->type == (int)(sizeof lexi__type_bytes / sizeof *lexi__type_bytes))
             return lexi__named(call, "tensor ", t->name.s, t->name.n, "its dtype is unknown");
     t->count = 1;
     for (i = shape + 1; i < j->nodes[shape].next; i++, t->rank++) {
@@ -663,11 +668,11 @@ static int lexi__read_tensor(lexi__call *call, const lexi__json *j, size_t node,
         t->count *= x;
         if (t->rank < 2) t->shape[t->rank] = x;
     }
-    bits = lexi__type_bits[t->type];
+    width = lexi__type_bytes[t->type];
     if (j->nodes[offsets + 1].kind != '0' || j->nodes[offsets + 2].kind != '0' ||
         !lexi__integer_of(lexi__node_text(j, offsets + 1), UINT64_MAX, &t->begin) ||
         !lexi__integer_of(lexi__node_text(j, offsets + 2), UINT64_MAX, &t->end) || t->end < t->begin ||
-        t->count > UINT64_MAX / bits || t->count * bits % 8 || t->end - t->begin != t->count * bits / 8)
+        t->count > UINT64_MAX / width || t->end - t->begin != t->count * width)
         return lexi__named(call, "tensor ", t->name.s, t->name.n, "its data_offsets do not hold its shape");
     return 1;
 }
@@ -902,7 +907,7 @@ static int lexi__is_property(lexi__text t) {
 /* Bytes of a value of a coded column, 0 if its type is unknown or not there. */
 static size_t lexi__column_width(const lexi_file *f, const lexi__tensor *t) {
     unsigned type = t->end > t->begin && lexi__is_there(f, t) ? lexi__data(f, t)[0] : 8;
-    return type < 8 ? lexi__type_bits[type] / 8 : 0;
+    return type < 8 ? lexi__type_bytes[type] : 0;
 }
 
 /* Take the tensor of a name. Its type and shape have to be these; the second number is 0 for a shape of one. */
@@ -1125,14 +1130,15 @@ static const unsigned char *lexi__bytes(lexi__cursor *c, const char *field, size
     return c->p - n;
 }
 
-static uint32_t lexi__fixed(lexi__cursor *c, const char *field, size_t n) { /* of 1, 2 or 4 bytes */
+static uint32_t lexi__fixed(lexi__cursor *c, const char *field, size_t n) { /* of 1 to 4 bytes */
     const unsigned char *p = lexi__bytes(c, field, n);
-    return !p ? 0 : n == 1 ? p[0] : n == 2 ? lexi__u16(p) : lexi__u32(p);
+    uint32_t x = 0;
+    for (size_t k = p ? n : 0; k; k--) x = x << 8 | p[k - 1];
+    return x;
 }
 
-static float lexi__real(lexi__cursor *c, const char *field, size_t n) { /* an f32, or a bf16 of 2 bytes */
-    uint32_t bits = lexi__fixed(c, field, n);
-    float x = lexi__float(n == 2 ? bits << 16 : bits);
+static float lexi__real(lexi__cursor *c, const char *field, size_t n) { /* an f32, or the n high bytes of one */
+    float x = lexi__float(lexi__fixed(c, field, n) << (32 - 8 * n));
     if (!lexi__finite(x)) { lexi__bad(c, field, "is not finite"); return 0; }
     return x;
 }
@@ -1419,7 +1425,7 @@ static int lexi__open_packed(lexi__call *call, lexi_file *f) {
         (order && !lexi__take(call, f, "packed.order", LEXI__U8, order->shape[0], 0, &order)) ||
         !lexi__check_names(call, f))
         return 0;
-    f->info.has_order = order != NULL;
+    f->info.has_order = order && f->size == f->whole;
     if (!lexi__is_there(f, head)) return lexi__refuse(call, "tensor packed.head", "it is not there as a whole");
     lexi__cursor c = {lexi__data(f, head), lexi__data(f, head) + (size_t)(head->end - head->begin), NULL, NULL};
     uint32_t crc = lexi__fixed(&c, "CRC-32", 4);
@@ -1474,7 +1480,7 @@ static int lexi__open_packed(lexi__call *call, lexi_file *f) {
     if (h->points) h->softening = lexi__real(&c, "softening", 4);
     if (!c.why && h->points && (h->softening < ldexp(1, -60) || h->softening > ldexp(1, 60)))
         return lexi__refuse(call, "packed.head", "softening is not from 2^-60 to 2^60");
-    for (int k = 0; k < 3 * h->points; k++) h->point[k / 3][k % 3] = lexi__real(&c, "points", 4);
+    for (int k = 0; k < 3 * h->points; k++) h->point[k / 3][k % 3] = lexi__real(&c, "points", 3);
     for (int k = 0; k < 5; k++) {
         h->mantissa[k] = lexi__fixed(&c, "steps", 2);
         h->shift[k] = (int)(lexi__fixed(&c, "steps", 1) ^ 0x80) - 0x80;
@@ -2420,12 +2426,6 @@ static int lexi__column(lexi__call *call, const lexi_file *f, const lexi__tensor
     return ok;
 }
 
-/* Whether all Gaussians are there, and a tensor for all of them too. */
-static int lexi__all_there(const lexi_file *f, const lexi__tensor *t) {
-    for (size_t i = 0; f->info.packed && i < f->info.chunk_count; i++) if (!f->chunks[i].range[0].bytes) return 0;
-    return lexi__is_there(f, t);
-}
-
 int lexi_decode_extra(lexi_file *f, size_t index, lexi_extra *extra, lexi_error *error) {
     lexi__call call = lexi__begin_call(f, error);
     memset(extra, 0, sizeof *extra);
@@ -2433,10 +2433,10 @@ int lexi_decode_extra(lexi_file *f, size_t index, lexi_extra *extra, lexi_error 
     const lexi__tensor *t = &f->tensors[f->extras[index]];
     extra->name = t->name.s + 6;
     extra->name_length = t->name.n - 6;
-    if (!lexi__all_there(f, t)) return 1;
+    if (f->size < f->whole) return 1;
     if (f->info.packed) return lexi__column(&call, f, t, &extra->type, &extra->width, &extra->values);
     extra->type = t->type;
-    extra->width = (int)lexi__type_bits[t->type] / 8;
+    extra->width = (int)lexi__type_bytes[t->type];
     if (!lexi__resize(&call, &extra->values, 0, t->end - t->begin, 1)) return 0;
     memcpy(extra->values, lexi__data(f, t), (size_t)(t->end - t->begin));
     return 1;
@@ -2468,7 +2468,7 @@ int lexi_restore_order(lexi_file *f, lexi_scene *s, lexi_extra *extras, size_t e
     unsigned char *values = NULL, *seen = NULL;
     uint32_t *order = NULL;
     int type, width, ok = 1;
-    if (!t || !lexi__all_there(f, t)) return 1;
+    if (!t || f->size < f->whole) return 1;
     if (n != f->info.gaussians) return lexi__misuse(&call, "scene", "it has not all Gaussians of the file");
     if (!lexi__column(&call, f, t, &type, &width, &values)) return 0;
     if (type != LEXI__U32)

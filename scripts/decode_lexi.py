@@ -19,13 +19,14 @@ from lexi3 import LexiError, check
 F = np.float32
 MAX_HEADER = 4 << 20
 PACKED = NEWEST = 3
-DTYPES = {"BOOL": "u1", "U8": "u1", "I8": "i1", "F8_E5M2": "u1", "F8_E4M3": "u1", "I16": "<i2", "U16": "<u2",
-          "F16": "<f2", "BF16": "<u2", "I32": "<i4", "U32": "<u4", "F32": "<f4", "F64": "<f8", "I64": "<i8",
-          "U64": "<u8"}
+MAX_DEPTH = 32
+DTYPES = {"BOOL": "u1", "I8": "i1", "U8": "u1", "I16": "<i2", "U16": "<u2", "F16": "<f2", "BF16": "<u2", "I32": "<i4",
+          "U32": "<u4", "F32": "<f4", "I64": "<i8", "U64": "<u8", "F64": "<f8"}
 EXTRA_TYPES = ("I8", "U8", "I16", "U16", "I32", "U32", "F32", "F64")
 # These are the properties of 3DGS, which an extra must not be called. Normals may be extras.
 RESERVED = re.compile(r"x|y|z|opacity|f_dc_[0-2]|f_rest_[0-9]+|scale_[0-2]|rot_[0-3]")
 INTEGER = re.compile(r"0|[1-9][0-9]*")
+SUM = re.compile(r"[0-9a-f]{8}")
 NUMBER = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 
 TRACE = """
@@ -57,6 +58,11 @@ def parse_json(text):
     try:
         value = json.loads(text, object_pairs_hook=members, parse_constant=constant, parse_int=integer)
         json.dumps(value, ensure_ascii=False).encode()          # refuses lone surrogates
+        inner = [value]
+        for _ in range(MAX_DEPTH + 1):
+            outer = [v for v in inner if isinstance(v, (dict, list))]
+            inner = [v for o in outer for v in (o.values() if isinstance(o, dict) else o)]
+        check(not outer, "arrays and objects of JSON are more than 32 deep")
         return value
     except (ValueError, RecursionError) as e:
         raise LexiError(f"bad JSON: {e}") from e
@@ -65,7 +71,8 @@ def parse_json(text):
 def read_container(data, beginning=False):
     """Return the metadata, the tensors as {name: (dtype, shape, entries)}, the bytes of the header, and where tensors lie.
 
-    If data is the beginning of a file, that is only tensors that are whole, and what is there of packed.data.
+    If data is the beginning of a file, it has only the entries of tensors that are whole, and what is there of
+    packed.data. Of others the entries are None.
     """
     check(len(data) >= 8, "the file is too short")
     length = int.from_bytes(data[:8], "little")
@@ -94,10 +101,9 @@ def read_container(data, beginning=False):
     for begin, end, name, dtype, shape in sorted(entries):
         check(begin == at and (end <= len(body) or beginning), f"{name} leaves a hole, overlaps or ends after the file")
         at = end
-        if end <= len(body):
-            tensors[name] = (dtype, shape, np.frombuffer(body[begin:end], DTYPES[dtype]))
-        elif name == "packed.data":
-            tensors[name] = (dtype, [max(len(body) - begin, 0)], np.frombuffer(body[begin:], "u1"))
+        whole = end <= len(body)
+        there = body[begin:end] if whole or name == "packed.data" else None
+        tensors[name] = (dtype, shape, None if there is None else np.frombuffer(there, DTYPES[dtype] if whole else "u1"))
     check(at == len(body) or beginning, "bytes follow the last tensor")
     return meta, tensors, data[:8 + length], {name: (begin, end) for begin, end, name, _, _ in entries}
 
@@ -116,7 +122,7 @@ def check_version(meta):
 def check_sums(meta, tensors, head, version, names):
     if version == PACKED:
         dtype, shape, own = tensors.get("packed.head", (None, [], None))
-        check(dtype == "U8" and len(shape) == 1 and len(own) >= 4, "no packed.head")
+        check(dtype == "U8" and len(shape) == 1 and own is not None and len(own) >= 4, "no packed.head")
         own = own.tobytes()
         check(zlib.crc32(head + own[4:]) == int.from_bytes(own[:4], "little"), "the header or packed.head is damaged")
         bare = {"packed.head", "packed.data"}
@@ -128,8 +134,10 @@ def check_sums(meta, tensors, head, version, names):
     sums = parse_json(meta.get("checksums", "{}" if version == PACKED else ""))
     check(isinstance(sums, dict) and set(sums) == names - bare,
           "checksums are not of all tensors that have one, and of nothing else")
-    for name in sums.keys() & tensors.keys():
-        check(sums[name] == f"{zlib.crc32(tensors[name][2].tobytes()):08x}", f"tensor {name} is damaged")
+    for name, text in sums.items():
+        check(isinstance(text, str) and SUM.fullmatch(text), f"the checksum of {name} is not of eight digits")
+        own = tensors[name][2]
+        check(own is None or text == f"{zlib.crc32(own.tobytes()):08x}", f"tensor {name} is damaged")
 
 
 # Metadata
@@ -198,15 +206,12 @@ def check_metadata(meta):
     check(meta.get("pursuit") in ("omp", "ols"), "metadata pursuit is neither omp nor ols")
     if "max_nonzeros" in meta:
         whole(meta, "max_nonzeros", 256)
-    else:
-        check("tolerance" in meta, "neither tolerance nor max_nonzeros")
     for key in ("tolerance", "max_residual", "rms_residual"):
         if key in meta or key != "tolerance":
             real(meta, key)
     whole(meta, "seed", 1 << 64)
-    whole(meta, "over_tolerance", 1 << 64 if "max_nonzeros" in meta else 1)
+    whole(meta, "over_tolerance", 1 << 64)
     check(meta.get("antialiased") in ("true", "false"), "metadata antialiased is neither true nor false")
-    check("generator" in meta, "no metadata generator")
     comments = parse_json(meta.get("comments", ""))
     check(isinstance(comments, list) and all(isinstance(c, str) for c in comments),
           "metadata comments is not a JSON list of strings")
@@ -227,7 +232,7 @@ class Tensors:
         kind, own, entries = self.left.pop(name)
         check(kind == dtype, f"{name} is not of type {dtype}")
         check(len(own) == len(shape) and all(s is None or s == a for s, a in zip(shape, own)), f"bad shape of {name}")
-        return entries.reshape(own)
+        return entries.reshape(own) if entries is not None and entries.size == math.prod(own) else entries
 
     def extras(self, n, coded=False):
         result = {}
@@ -236,11 +241,16 @@ class Tensors:
             check(own and not any(c.isspace() or unicodedata.category(c) == "Cc" for c in own) and not RESERVED.fullmatch(own),
                   f"an extra must not be named as {name}")
             if coded:
-                result[own] = lexi3.read_column(self.take(name, "U8", (None,)).tobytes(), n)
+                result[own] = self.column(name, n)
                 continue
             check(self.left[name][0] in EXTRA_TYPES, f"bad type of {name}")
             result[own] = self.take(name, self.left[name][0], (n,))
         return result
+
+    def column(self, name, n):
+        """Return a coded column; None without a number of rows."""
+        data = self.take(name, "U8", (None,))
+        return None if n is None else lexi3.read_column(data.tobytes(), n)
 
     def finish(self):
         for name in self.left:
@@ -316,22 +326,20 @@ def decode_plain(t, layout, d):
 def decode_packed(t, meta, d, header, places, beginning, trace):
     n = int(meta["gaussians"])
     check(n <= 3 * (header + max(end for _, end in places.values())), "more Gaussians than the file has room for")
-    check("packed.data" in places, "no packed.data")
+    data = t.take("packed.data", "U8", (None,)).tobytes()
     begin, end = places["packed.data"]
-    size = len(t.left["packed.data"][2]) if "packed.data" in t.left else 0
-    data = t.take("packed.data", "U8", (size,)).tobytes() if "packed.data" in t.left or not beginning else b""
     head = lexi3.Head(t.take("packed.head", "U8", (None,)).tobytes(), n, end - begin, d)
-    order = None
-    if "packed.order" in t.left:
-        order = lexi3.read_column(t.take("packed.order", "U8", (None,)).tobytes(), n)
+    rows = None if beginning else n                      # a first part has no columns
+    order = t.column("packed.order", rows) if "packed.order" in t.left else None
+    if order is not None:
         check(order.dtype == np.dtype("<u4") and (np.sort(order) == np.arange(n)).all(), "the order is no permutation")
-    extras = t.extras(n, True)
+    extras = t.extras(rows, True)
     t.finish()
     integers, there, sums = lexi3.decode_ranges(head, data, trace)
     check(beginning or there.all(), "a base is missing")
     out = lexi3.values_of(head, integers, there)
-    out["extras"] = extras if there.all() else {}
-    if order is not None and there.all():
+    out["extras"] = {} if beginning else extras
+    if order is not None:
         out["order"] = order
     return out | {"there": there, "integers": sums, "ranges": head.ranges}
 
@@ -347,6 +355,7 @@ def decode(data, beginning=False, trace=None):
     """
     with np.errstate(all="ignore"):
         meta, tensors, head, places = read_container(data, beginning)
+        beginning = len(data) < len(head) + max((end for _, end in places.values()), default=0)
         version, layout = check_version(meta)
         packed = version == PACKED
         check(packed or not beginning, "only packed files can be decoded in part")

@@ -66,12 +66,15 @@ class Bytes:
     def f32(self, n):
         return self.floats([self.take(4) for _ in range(n)])
 
+    def f24(self, n):
+        return self.floats([bytes(1) + self.take(3) for _ in range(n)])
+
     def bf16(self, n):
         return self.floats([bytes(2) + self.take(2) for _ in range(n)])
 
     def floats(self, pieces):
         values = [struct.unpack("<f", x)[0] for x in pieces]
-        check(all(map(math.isfinite, values)), "an f32 or bf16 of packed.head is not finite")
+        check(all(map(math.isfinite, values)), "an f32, f24 or bf16 of packed.head is not finite")
         return values
 
     def end(self):
@@ -269,7 +272,7 @@ class Head:
         self.dc_axes = axes_of(*turn)
         self.softening = b.f32(1)[0] if views else 1.0
         check(2.0 ** -60 <= self.softening <= 2.0 ** 60, "softening is not from 2^-60 to 2^60")
-        self.points = np.array(b.f32(3 * views)).reshape(views, 3)
+        self.points = np.array(b.f24(3 * views)).reshape(views, 3)
         steps = [b.unpack("Hb") for _ in range(5)]
         check(all(-6 <= h <= 31 for _, h in steps), "the shift of a step is not from -6 to 31")
         self.steps = np.array([[min(max(M << min(c - h, 6) if c >= h else M >> h - c, 1), 3 << 19) for c in range(16)]
@@ -693,10 +696,6 @@ def decode_ranges(head, data, trace=None):
     n, chunks = int(head.first[-1]), range(len(head.count))
     out, sums = Integers(n), {}
     whole = {key for key, (start, length, *_) in head.ranges.items() if start + length <= len(data)}
-    for key in whole:
-        start, length, crc, _ = head.ranges[key]
-        check(zlib.crc32(data[start:start + length]) == crc, f"range {key} is damaged")
-
     def run(kind_of, decoder, row_of, set_of=lambda c: 0):
         """Decode the range of kind kind_of(c) of every chunk c that has it and all that it needs."""
         keys = [(c, kind_of(c)) for c in chunks if kind_of(c) is not None and needs(c, kind_of(c)) <= whole]
@@ -716,6 +715,10 @@ def decode_ranges(head, data, trace=None):
         R = head.refinements[c]
         first = 1 if kind <= R else R + 1 if kind <= R + head.parts else kind
         return {(c, 0), *((c, k) for k in range(first, kind + 1))}
+
+    for key in whole:
+        start, length, crc, _ = head.ranges[key]
+        check(not needs(*key) <= whole or zlib.crc32(data[start:start + length]) == crc, f"range {key} is damaged")
 
     def rows(*variables):
         values = np.vstack(variables).T

@@ -351,6 +351,73 @@ fn members_that_are_there_twice_are_refused() {
     }
 }
 
+/// Parsers differ in how deep they go.
+#[test]
+fn json_is_at_most_32_deep() {
+    let lists = |depth: usize| "[".repeat(depth) + &"]".repeat(depth);
+    for name in SCENES {
+        let parts = parts_of(name);
+        let bytes = parts.sealed();
+        // The header and the entry of a tensor are around these.
+        let nested = |depth| {
+            let more = format!(r#"{{"more":{},"data_offsets":"#, lists(depth));
+            with_header(&bytes, |text| text.replacen(r#"{"data_offsets":"#, &more, 1))
+        };
+        assert_eq!(read(&nested(30)).map(|r| r.is_ok()), [true; 2], "{name}");
+        for error in refusals(&nested(31), parts.metadata["degree"].as_str().unwrap()) {
+            let said = error.to_string();
+            assert!(said.contains("the header: arrays and objects more than 32 deep"), "{said}");
+        }
+    }
+    let parts = parts_of("packed3");
+    let target = parts.metadata["target"].as_str().unwrap();
+    let nested =
+        |depth| parts.with("target", &target.replacen('{', &format!(r#"{{"x":{},"#, lists(depth)), 1));
+    assert_same("packed3", &nested(31), &parts);
+    for said in scene_refusals(&nested(32).sealed()) {
+        assert!(said.contains("metadata 'target': arrays and objects more than 32 deep"), "{said}");
+    }
+}
+
+#[test]
+fn tensors_are_of_types_that_are_listed() {
+    for name in SCENES {
+        let parts = parts_of(name);
+        for dtype in
+            ["BOOL", "I8", "U8", "I16", "U16", "F16", "BF16", "I32", "U32", "F32", "I64", "U64", "F64"]
+        {
+            assert_same(name, &parts.and("x-a", dtype, &[0], &[]), &parts);
+        }
+        for dtype in [
+            "F4",
+            "F6_E2M3",
+            "F6_E3M2",
+            "F8_E5M2",
+            "F8_E4M3",
+            "F8_E8M0",
+            "F8_E4M3FNUZ",
+            "F8_E5M2FNUZ",
+            "C64",
+            "u8",
+            "",
+        ] {
+            assert_refused(&parts.and("x-a", dtype, &[0], &[]), &["tensor 'x-a' has an unknown dtype"]);
+        }
+    }
+}
+
+#[test]
+fn version_1_may_lack_its_generator_and_what_stopped_the_pursuit() {
+    for name in SCENES.iter().filter(|name| !is_packed(name)) {
+        let parts = parts_of(name);
+        let mut less = parts.clone();
+        for key in ["generator", "tolerance", "max_nonzeros"] {
+            less.metadata.remove(key);
+        }
+        assert_same(name, &less, &parts);
+    }
+}
+
 #[test]
 fn numbers_of_the_metadata_are_those_of_json() {
     for name in SCENES {
@@ -359,6 +426,13 @@ fn numbers_of_the_metadata_are_those_of_json() {
             ("seed", "+7"),
             ("seed", "017"),
             ("seed", " 7"),
+            ("seed", "3e2"),
+            ("seed", "-0"),
+            ("seed", "7.0"),
+            ("degree", "-0"),
+            ("version", "1e0"),
+            ("max_nonzeros", "-0"),
+            ("over_tolerance", "0e0"),
             ("max_residual", ".5"),
             ("max_residual", "5."),
             ("max_residual", "NaN"),
@@ -372,6 +446,23 @@ fn numbers_of_the_metadata_are_those_of_json() {
             }
         }
         assert_same(name, &parts.with("max_residual", "1e-3"), &parts.with("max_residual", "0.001"));
+        assert_same(name, &parts.with("tolerance", "-0"), &parts.with("tolerance", "0"));
+    }
+    let parts = parts_of("packed3");
+    for (key, wrong) in [("gaussians", "3e2"), ("gaussians", "300.0"), ("removed", "-0")] {
+        for said in scene_refusals(&parts.with(key, wrong).sealed()) {
+            assert!(said.contains(&format!("metadata '{key}' is '{wrong}'")), "{said}");
+        }
+    }
+    let reached = |views: &str| {
+        let numbers = r#""judged_psnr":-0,"mean_psnr":4e1,"min_psnr":31.0,"cameras":false"#;
+        parts.with("reached", &format!(r#"{{{numbers},"views":{views}}}"#))
+    };
+    assert_same("packed3", &reached("12"), &parts);
+    for views in ["-0", "12.0", "1e1", "4294967296"] {
+        for said in scene_refusals(&reached(views).sealed()) {
+            assert!(said.contains("metadata 'reached'"), "{said}");
+        }
     }
 }
 
@@ -422,10 +513,18 @@ fn a_dictionary_alone_keeps_the_same_rules() {
         let said = read(&parts.and(name, "F32", &[1], &[0; 4])).unwrap_err().to_string();
         assert_eq!(said, format!("d.lexi: tensor '{name}' is not known in a dictionary"));
     }
-    for version in ["0", "one"] {
+    for version in ["0", "one", "2", "3"] {
         let said = read(&parts.with("version", version)).unwrap_err().to_string();
         assert!(said.contains("metadata 'version' is "), "{said}");
     }
+    let said = read(&parts.with("version", "3")).unwrap_err().to_string();
+    assert!(said.ends_with("is 3, and a dictionary's is 1"), "{said}");
+    let said = read(&parts.with("degree", "0")).unwrap_err().to_string();
+    assert!(said.contains("SH degree 0 has no dictionary"), "{said}");
+    // What only scenes have is not looked at.
+    let mut less = parts.with("layout", "holographic").with("pursuit", "lasso").with("seed", "x");
+    less.metadata.remove("generator");
+    assert_eq!(read(&less).unwrap(), original);
     let mut bytes = more.sealed();
     let at = bytes.windows(2).rposition(|w| w == b"no").unwrap();
     bytes[at] ^= 1;

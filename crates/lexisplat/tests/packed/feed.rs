@@ -396,6 +396,87 @@ fn extras_are_left_out_of_a_first_part() {
     assert_eq!(all.empty().geometry.extras.len(), 2);
 }
 
+/// What the header alone says must be right of tensors too that are not there yet.
+#[test]
+fn tensors_that_are_not_there_yet_are_described_rightly() {
+    let splats = with_extras(sample(500, 3, 1));
+    let mut good = Parts::of(&bytes(&pack(&splats, STEP, &options(|o| o.keep_order = true)).0));
+    good.tensors.sort_by_key(|tensor| tensor.0 != "packed.head");
+    let head = good.tensors[0].3.len();
+    let first = |file: &[u8]| {
+        let file = &file[..header_end(file) + head];
+        let opened = LexiReader::open_first(NAME, file, &Limits::default()).map(drop);
+        let fed = feed(&FeedOptions::default()).feed(0, file);
+        [opened, fed].map(|result| result.map_err(|error| error.to_string()))
+    };
+    assert_eq!(first(&good.sealed()), [Ok(()), Ok(())]);
+    for name in ["packed.data", "packed.order", "extra.label"] {
+        let changes: [fn(&mut serde_json::Value, &mut serde_json::Value, usize); 3] = [
+            |dtype, _, _| *dtype = "I8".into(),
+            |_, shape, len| *shape = serde_json::json!([len, 1]),
+            |_, shape, len| *shape = serde_json::json!([1, len]),
+        ];
+        for change in changes {
+            let mut parts = good.clone();
+            let tensor = parts.tensors.iter_mut().find(|tensor| tensor.0 == name).unwrap();
+            change(&mut tensor.1, &mut tensor.2, tensor.3.len());
+            for result in first(&parts.sealed()) {
+                let said = result.unwrap_err();
+                assert!(said.contains(&format!("tensor '{name}' is not U8 of one dimension")), "{said}");
+            }
+        }
+    }
+    // Sums are listed of them too, of nothing else, and as sums are written.
+    let sums = good.metadata["checksums"].as_str().unwrap();
+    let wrong: [(String, &str); 4] = [
+        (sums.replacen("extra.label", "extra.labels", 1), "names 'extra.labels'"),
+        (sums.replacen("\"packed.order\":\"", "\"packed.order\":\"0", 1), "lacks tensor 'packed.order'"),
+        (sums.replacen("\"packed.order\":\"", "\"x\":\"", 1), "names 'x'"),
+        ("{}".to_owned(), "lacks tensor 'extra.label'"),
+    ];
+    for (sums, rule) in wrong {
+        for result in first(&with_sums(&good.sealed(), &sums)) {
+            let said = result.unwrap_err();
+            assert!(said.contains("metadata 'checksums' ") && said.contains(rule), "{said}");
+        }
+    }
+}
+
+/// Where the header of a file ends.
+fn header_end(file: &[u8]) -> usize {
+    8 + place(u64::from_le_bytes(*file.first_chunk().unwrap()))
+}
+
+/// The file with other sums of its tensors, and a checksum of its head that fits.
+fn with_sums(file: &[u8], sums: &str) -> Vec<u8> {
+    let (text, data) = file.split_at(header_end(file));
+    let mut header: serde_json::Value = serde_json::from_slice(&text[8..]).unwrap();
+    header["__metadata__"]["checksums"] = sums.into();
+    let offsets = header["packed.head"]["data_offsets"].clone();
+    let at = |k: usize| place(offsets[k].as_u64().unwrap());
+    let text = header.to_string();
+    let mut new = [&(text.len() as u64).to_le_bytes(), text.as_bytes()].concat();
+    let mut crc = crc32fast::Hasher::new();
+    crc.update(&new);
+    crc.update(&data[at(0) + 4..at(1)]);
+    new.extend_from_slice(data);
+    let sum = header_end(&new) + at(0);
+    new[sum..sum + 4].copy_from_slice(&crc.finalize().to_le_bytes());
+    new
+}
+
+/// Damage of a range that a whole file does not need is found.
+#[test]
+fn interim_ranges_of_whole_files_have_right_checksums() {
+    let mut file = file().to_vec();
+    let outline = outline(&file);
+    let range = outline.ranges.iter().find(|range| range.kind == RangeKind::Interim).unwrap();
+    file[place(range.bytes.start)] ^= 1;
+    let error = LexiReader::open(NAME, &file[..], &Limits::default()).unwrap().model().unwrap_err();
+    let last = outline.ranges.iter().filter(|other| other.chunk == range.chunk).count() - 1;
+    assert!(error.to_string().contains(&format!("'range {last} of chunk {}'", range.chunk)), "{error}");
+}
+
 #[test]
 fn parts_of_sh_are_dropped_and_colours_seen_stay() {
     let file = file();

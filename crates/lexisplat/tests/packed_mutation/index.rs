@@ -9,10 +9,10 @@ use crate::parts::Parts;
 pub(crate) const TENSORS: [&str; 3] = ["packed.head", "packed.data", "packed.order"];
 /// Bytes of the checksum that a head starts with.
 const SEAL: usize = 4;
-/// Bytes of numbers of fixed size: grid, step, mean and turn of base colours; steps; softening; a point of view.
+/// Bytes of numbers of fixed size: grid, step, mean and turn of base colours; steps; softening; a point of view of f24.
 const VALUES: usize = 8 * 4 + 4 * 2;
 const STEPS: usize = 5 * 3;
-const SOFTENING: usize = 3;
+const SOFTENING: usize = 4;
 const POINT: usize = 3 * 3;
 /// Bytes of the bounds of a chunk, and of the two checksums of a range.
 const BOUNDS: usize = 6 * 2;

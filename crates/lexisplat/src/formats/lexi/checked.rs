@@ -6,7 +6,9 @@ use safetensors::Dtype;
 
 use super::header::{Header, TensorInfo};
 use super::json::{self, Json};
-use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, PACKED_VERSION, VERSION, key, tensor};
+use super::schema::{
+    DICTIONARY_FORMAT, IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, PACKED_VERSION, VERSION, key, tensor,
+};
 use crate::formats::kind::FileKind;
 use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
@@ -95,6 +97,11 @@ impl<'a> Checked<'a> {
             );
             return Err(malformed(text));
         }
+        if found == DICTIONARY_FORMAT && version != VERSION {
+            return Err(malformed(format!(
+                "metadata 'version' is {version}, and a dictionary's is {VERSION}"
+            )));
+        }
         if extent == Extent::First && version != PACKED_VERSION {
             let text = format!(
                 "version {version} of the format is only read whole; what is written as version \
@@ -139,17 +146,20 @@ impl<'a> Checked<'a> {
             };
             return Err(self.malformed(format!("metadata 'checksums' names '{name}', {why}")));
         }
+        // Of a first part too, the sums of all tensors must be listed.
+        let listed = |name: &str| sums.get(name).and_then(Json::text).unwrap_or_default();
+        if let Some(name) = names.iter().find(|name| !is_sum(listed(name))) {
+            let text =
+                format!("metadata 'checksums' lacks tensor '{name}', or has no 8 digits 0-9 or a-f of it");
+            return Err(self.malformed(text));
+        }
         names.retain(|name| self.is_there(name));
         let found = map_chunks(names.len(), 1, |range| {
             let name = names[range.start];
             self.view(name).map(|t| format!("{:08x}", crc32::hash(t.data)))
         });
         for (name, sum) in names.iter().zip(found) {
-            let expected = sums
-                .get(name)
-                .and_then(Json::text)
-                .ok_or_else(|| self.malformed(format!("metadata 'checksums' lacks tensor '{name}'")))?;
-            if sum.ok().as_deref() != Some(expected) {
+            if sum.ok().as_deref() != Some(listed(name)) {
                 return Err(Error::format(&self.file, FormatError::Checksum { part: (*name).to_owned() }));
             }
         }
@@ -271,6 +281,15 @@ impl<'a> Checked<'a> {
         Ok(TensorView { dtype: *dtype, shape, data })
     }
 
+    /// Refuses the tensor `name` unless it is a list of bytes. The header alone says so, so the bytes need not be there.
+    pub(super) fn must_be_bytes(&self, name: &str) -> Result<()> {
+        match self.header.info(name) {
+            Some(TensorInfo { dtype: Dtype::U8, shape, .. }) if shape.len() == 1 => Ok(()),
+            Some(_) => Err(self.malformed(format!("tensor '{name}' is not U8 of one dimension"))),
+            None => Err(self.malformed(format!("tensor '{name}' is missing"))),
+        }
+    }
+
     /// Returns the length of the tensor `name`, which must have one dimension.
     pub(super) fn list_len(&self, name: &str) -> Result<usize> {
         match self.view(name)?.shape {
@@ -324,6 +343,11 @@ impl<'a> Checked<'a> {
         let data = data.ok_or_else(|| self.malformed(format!("tensor '{name}' is too short")))?;
         Ok(bytemuck::allocation::pod_collect_to_vec(data))
     }
+}
+
+/// Returns whether `text` is a checksum as metadata list it: eight hexadecimal digits in lower case.
+fn is_sum(text: &str) -> bool {
+    text.len() == 8 && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }
 
 /// Returns whether `text` is a number as JSON writes it, or `true` or `false`.

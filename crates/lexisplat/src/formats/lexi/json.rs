@@ -5,8 +5,8 @@
 
 use crate::support::order::order;
 
-/// Largest depth of arrays and objects within one another, as in `serde_json`.
-const MOST_DEPTH: usize = 127;
+/// Largest depth of arrays and objects within one another (docs/FORMAT.md, "Container"). The outermost is 1 deep.
+const MOST_DEPTH: usize = 32;
 
 /// A JSON value.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -100,7 +100,9 @@ impl Parser<'_> {
         match self.next_token() {
             Some(b'"') => self.string().map(Json::Text),
             Some(b'-' | b'0'..=b'9') => self.number(),
-            Some(b'[' | b'{') if depth == 0 => Err(self.wrong("too much within one another")),
+            Some(b'[' | b'{') if depth == 0 => {
+                Err(self.wrong(&format!("arrays and objects more than {MOST_DEPTH} deep")))
+            }
             Some(b'[') => self.list(depth - 1),
             Some(b'{') => self.object(depth - 1),
             _ => self.word(),
@@ -310,12 +312,17 @@ mod tests {
         }
     }
 
-    /// Checks that [`Json::parse`] takes and refuses the same texts as `serde_json`, except texts with a member twice.
+    /// Checks that [`Json::parse`] takes and refuses the same texts as `serde_json`, except texts with a member twice or
+    /// deeper than [`MOST_DEPTH`].
     fn agrees(text: &[u8]) {
         let shown = String::from_utf8_lossy(text);
         match (Json::parse(text), serde_json::from_slice::<serde_json::Value>(text)) {
             (Ok(own), Ok(other)) => assert_eq!(rewritten(own), of_serde(&other), "{shown}"),
-            (Err(error), Ok(_)) => assert!(error.contains("is there twice"), "{shown}: {error}"),
+            (Err(error), Ok(_)) => {
+                let is_known =
+                    ["is there twice", "more than 32 deep"].iter().any(|rule| error.contains(rule));
+                assert!(is_known, "{shown}: {error}");
+            }
             (Ok(_), Err(error)) => panic!("{shown}: {error}"),
             (Err(_), Err(_)) => {}
         }
@@ -350,9 +357,13 @@ mod tests {
             b"\xef\xbb\xbf1",
         ];
         texts.into_iter().for_each(agrees);
-        for depth in [126, 127, 128] {
-            agrees(&[vec![b'['; depth], vec![b']'; depth]].concat());
-            agrees(&[b"{\"a\":".repeat(depth), vec![b'1'], vec![b'}'; depth]].concat());
+        for depth in [1, 31, 32, 33, 128] {
+            let lists = [vec![b'['; depth], vec![b']'; depth]].concat();
+            let objects = [b"{\"a\":".repeat(depth), vec![b'1'], vec![b'}'; depth]].concat();
+            for text in [lists, objects] {
+                agrees(&text);
+                assert_eq!(Json::parse(&text).is_ok(), depth <= MOST_DEPTH, "{depth}");
+            }
         }
         const BYTES: &[u8] = b"\"\\u{}[]:,0-.eEd8x \x00\xff";
         let mut rng = crate::support::rng::SplitMix64::new(9);

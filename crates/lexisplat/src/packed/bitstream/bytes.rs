@@ -57,6 +57,16 @@ impl<'a> ByteReader<'a> {
         self.u16().map(|high| f32::from_bits(u32::from(high) << 16)).filter(|x| x.is_finite())
     }
 
+    /// Takes `N` finite f24: the three high bytes of an f32, whose other byte is 0.
+    pub(in crate::packed) fn f24s<const N: usize>(&mut self) -> Option<[f32; N]> {
+        let mut out = [0.0; N];
+        for value in &mut out {
+            let [low, middle, high] = self.array()?;
+            *value = Some(f32::from_le_bytes([0, low, middle, high])).filter(|x| x.is_finite())?;
+        }
+        Some(out)
+    }
+
     /// Takes a finite f32.
     pub(in crate::packed) fn f32(&mut self) -> Option<f32> {
         self.array().map(f32::from_le_bytes).filter(|x| x.is_finite())
@@ -113,6 +123,18 @@ pub(in crate::packed) fn put_bf16(out: &mut Vec<u8>, x: f32) {
     out.extend(x.to_le_bytes().iter().skip(2));
 }
 
+/// Writes `x` as an f24: its three high bytes. The other must be 0; see [`nearest_f24`].
+pub(in crate::packed) fn put_f24(out: &mut Vec<u8>, x: f32) {
+    out.extend(x.to_le_bytes().iter().skip(1));
+}
+
+/// Returns the f24 nearest to `x`. It is finite if `x` is.
+pub(in crate::packed) fn nearest_f24(x: f32) -> f32 {
+    let cut = |bits: u32| f32::from_bits(bits & !0xff);
+    let near = cut(x.to_bits().wrapping_add(0x80));
+    if near.is_finite() { near } else { cut(x.to_bits()) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,5 +161,22 @@ mod tests {
             assert_eq!((out.len(), ByteReader(&out).bf16()), (2, Some(x)));
         }
         assert_eq!(ByteReader(&[0x80, 0x7f]).bf16(), None);
+    }
+
+    #[test]
+    fn f24_are_the_nearest_and_come_back() {
+        for x in [0.0, 1.0, -1.5, 3.25e-3, 0.1, -7.3, 1e30, -1e-30, f32::MAX, f32::MIN] {
+            let near = nearest_f24(x);
+            let next = |near: f32| f32::from_bits(near.to_bits().wrapping_add(0x100));
+            // Half of the distance of two numbers of 15 bits after the first. The largest f32 has no f24 above it.
+            let most = if next(near).is_finite() { x.abs() / 65536.0 } else { x.abs() / 32768.0 };
+            assert!((near - x).abs() <= most, "{x} {near}");
+            let mut out = Vec::new();
+            put_f24(&mut out, near);
+            assert_eq!((out.len(), ByteReader(&out).f24s()), (3, Some([near])));
+        }
+        for bytes in [&[0, 0x80, 0x7f][..], &[1, 0x80, 0xff], &[0, 0]] {
+            assert_eq!(ByteReader(bytes).f24s::<1>(), None);
+        }
     }
 }

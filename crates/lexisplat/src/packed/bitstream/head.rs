@@ -4,7 +4,7 @@
 use super::atoms::WholeAtoms;
 use super::axes::{axes_of, turn_of};
 use super::broken::{BrokenHead, must};
-use super::bytes::{ByteReader, Fields, put_number};
+use super::bytes::{ByteReader, Fields, put_f24, put_number};
 use super::chunk::Form;
 use super::fill_in::MOST_STEP;
 use super::index::Index;
@@ -147,7 +147,8 @@ impl Head {
         );
         out.extend(self.dc_turn.iter().flat_map(|x| x.to_le_bytes()));
         let softening = (!points.is_empty()).then_some(&self.mean_view.softening);
-        out.extend(softening.into_iter().chain(points.as_flattened()).flat_map(|x| x.to_le_bytes()));
+        out.extend(softening.into_iter().flat_map(|x| x.to_le_bytes()));
+        points.as_flattened().iter().for_each(|&x| put_f24(&mut out, x));
         for step in self.integers.steps {
             out.extend(step.mantissa.to_le_bytes());
             out.extend(step.shift.to_le_bytes());
@@ -223,7 +224,7 @@ impl Head {
             })?;
         }
         for _ in 0..points {
-            mean_view.points.push(from.take("points", ByteReader::f32s)?);
+            mean_view.points.push(from.take("points", ByteReader::f24s)?);
         }
         let mut integers = Integers::default();
         for step in &mut integers.steps {

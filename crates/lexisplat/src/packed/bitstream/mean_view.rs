@@ -4,6 +4,7 @@
 //! few directions, so a file holds the average colour from a few points of view. The decoder subtracts what the SH-rest
 //! that is there adds to that average. So a Gaussian has its best colour with and without its SH-rest.
 
+use super::bytes::nearest_f24;
 use super::halves::doubled;
 use crate::packed::bitstream::sh_codes::Nonzero;
 use crate::packed::entropy::lanes::{LANES, Lanes};
@@ -18,7 +19,7 @@ pub(in crate::packed) const MAX_POINTS: usize = 15;
 /// Largest number of coefficients of one channel of SH-rest.
 pub(in crate::packed) const MOST: usize = MAX_COEFFICIENTS - 1;
 
-/// The points of view of a file. Without points, base colours are those of the source.
+/// The points of view of a file. Without points, base colours are those of the source. Their coordinates are f24.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct MeanView {
     pub(in crate::packed) points: Vec<Vec3>,
@@ -43,12 +44,12 @@ fn difference(position: f32, point: f32) -> f32 {
 }
 
 impl MeanView {
-    /// Creates a view from the first [`MAX_POINTS`] of `points`.
+    /// Creates a view from the first [`MAX_POINTS`] of `points`, rounded as a file holds them.
     pub(in crate::packed) fn new(points: &[Vec3]) -> Self {
         if points.is_empty() {
             return Self::default();
         }
-        let points: Vec<Vec3> = points.iter().take(MAX_POINTS).copied().collect();
+        let points: Vec<Vec3> = points.iter().take(MAX_POINTS).map(|point| point.map(nearest_f24)).collect();
         let middle: Vec3 =
             std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f32>() / points.len() as f32);
         let far = |p: &Vec3| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f32>().sqrt();

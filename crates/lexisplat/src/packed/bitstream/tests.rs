@@ -220,7 +220,7 @@ fn changed_heads_are_others_or_refused() {
 
 #[test]
 fn heads_with_numbers_no_decoder_takes_are_refused() {
-    let changes: [fn(&mut Head); 16] = [
+    let changes: [fn(&mut Head); 17] = [
         |h| h.dc_exponent = 101,
         |h| h.rest.atoms = 0,
         |h| h.rest.atoms = 1025,
@@ -235,6 +235,7 @@ fn heads_with_numbers_no_decoder_takes_are_refused() {
         |h| h.mean_view.softening = 1e19,
         |h| h.dc_turn = [0; 4],
         |h| h.mean_view.points = vec![[0.0; 3]; 16],
+        |h| h.mean_view.points[7] = [1.0, f32::INFINITY, 0.0],
         |h| h.interim = Some([1, 0, 1]),
         |h| h.interim = Some([1, 1, 1 << 27]),
     ];

@@ -84,10 +84,9 @@ impl BitstreamDecoder {
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
-        let damaged =
-            || Error::malformed(&self.file, format!("packed chunk {c} is damaged: no encoder writes it"));
+        let damaged = |rule: &str| Error::malformed(&self.file, format!("packed.data: chunk {c} {rule}"));
         let index = &self.head.index;
-        let chunk = index.chunks.get(c).ok_or_else(damaged)?;
+        let chunk = index.chunks.get(c).ok_or_else(|| damaged("is not in the index"))?;
         let form = index.layer(chunk.layer);
         let alone = index.alone(chunk.layer, |range| data.came(range.start, range.length));
         let is_wanted =
@@ -116,7 +115,8 @@ impl BitstreamDecoder {
             }
         }
         for escape in &mut piece.escapes.gaussians {
-            *escape = u32::try_from(first + *escape as usize).map_err(|_| damaged())?;
+            *escape = u32::try_from(first + *escape as usize)
+                .map_err(|_| damaged("has exact rows of more than 2^32 Gaussians"))?;
         }
         let most = place.counts.iter().copied().max().unwrap_or(0);
         if u64::from(most) > self.limits.nonzeros {
@@ -124,7 +124,7 @@ impl BitstreamDecoder {
             self.limits.check_nonzeros(&self.file, chunk.first + i, most.into())?;
         }
         if piece.atoms.iter().max().is_some_and(|&atom| usize::from(atom) >= self.dictionary().len()) {
-            return Err(damaged());
+            return Err(damaged("has an atom that is not below 'm'"));
         }
         Ok(piece)
     }

@@ -71,6 +71,80 @@ mod tests {
         (0..len).map(|_| random.below(different).to_le_bytes()[0]).collect()
     }
 
+    /// Bits of a stream, the first ones first.
+    #[derive(Default, Clone)]
+    struct Bits(Vec<bool>);
+
+    impl Bits {
+        /// Adds a number of `count` bits, the lowest first.
+        fn number(mut self, number: usize, count: usize) -> Self {
+            self.0.extend((0..count).map(|k| number >> k & 1 == 1));
+            self
+        }
+
+        /// Adds a code of `count` bits, the highest first.
+        fn code(mut self, code: usize, count: usize) -> Self {
+            self.0.extend((0..count).rev().map(|k| code >> k & 1 == 1));
+            self
+        }
+
+        /// Adds the start of a dynamic block with `count` literals and lengths. Those not in `literals` have no code.
+        fn block(self, last: bool, literals: &[(usize, usize)], count: usize, distances: &[usize]) -> Self {
+            let mut out = self.number(last.into(), 1).number(2, 2);
+            out = out.number(count - 257, 5).number(distances.len() - 1, 5).number(15, 4);
+            // Codes of 4 bits for the lengths from 0 to 15. Lengths 16 to 18 come first in the order of the standard.
+            for length in [0; 3].into_iter().chain([4; 16]) {
+                out = out.number(length, 3);
+            }
+            let mut lengths = vec![0; count];
+            literals.iter().for_each(|&(symbol, length)| lengths[symbol] = length);
+            lengths.extend(distances);
+            lengths.into_iter().fold(out, |out, length| out.code(length, 4))
+        }
+
+        /// Adds 300 zeros, in literals and lengths of two bits, and the end of the block.
+        fn zeros(self, distance: usize, count: usize) -> Self {
+            let far = self.code(0, 2).code(3, 2).code(distance, count);
+            far.code(2, 2).number(6, 3).code(distance, count).code(1, 2)
+        }
+
+        fn taken(&self) -> bool {
+            let byte = |bits: &[bool]| (0..).zip(bits).map(|(k, &bit)| u8::from(bit) << k).sum::<u8>();
+            let stream: Vec<u8> = self.0.chunks(8).map(byte).collect();
+            let (mut found, stream) = ([1; 300], [&length_bytes(stream.len())[..], &stream].concat());
+            let taken = take(&mut stream.as_slice(), &mut found).is_some();
+            assert!(!taken || found == [0; 300]);
+            taken
+        }
+    }
+
+    /// Decoders of deflate differ in codes that are not complete (docs/FORMAT.md, "Coded columns").
+    #[test]
+    fn codes_are_taken_as_by_zlib() {
+        const TWO: [(usize, usize); 4] = [(0, 2), (256, 2), (273, 2), (285, 2)];
+        let distances = |lengths: &[usize], distance, count| {
+            Bits::default().block(true, &TWO, 286, lengths).zeros(distance, count).taken()
+        };
+        assert!(distances(&[1, 1], 0, 1) && distances(&[1], 0, 1));
+        assert!(distances(&[[1, 1].as_slice(), &[0; 28]].concat(), 0, 1));
+        // More distances than there are, incomplete codes, too many codes, and a code that nothing has.
+        assert!(!distances(&[[1, 1].as_slice(), &[0; 29]].concat(), 0, 1));
+        assert!(!distances(&[2], 0, 2) && !distances(&[2, 2], 0, 2) && !distances(&[2, 2, 2], 0, 2));
+        assert!(!distances(&[1, 1, 1], 0, 1) && !distances(&[1], 1, 1) && !distances(&[0], 0, 1));
+        assert!(!Bits::default().block(true, &TWO, 287, &[1]).zeros(0, 1).taken());
+        // Literals alone need no distances.
+        let literals = |lengths: &[(usize, usize)], count: usize| {
+            let block = Bits::default().block(true, lengths, 286, &[0]);
+            (0..300).fold(block, |bits, _| bits.code(0, count)).code(1, count).taken()
+        };
+        assert!(literals(&[(0, 1), (256, 1)], 1));
+        assert!(!literals(&[(0, 2), (256, 2)], 2) && !literals(&[(0, 1), (1, 1), (256, 1)], 1));
+        // A block may hold nothing but its end, which is one code of one bit.
+        let end = |length| Bits::default().block(false, &[(256, length)], 257, &[0]).code(0, length);
+        assert!(end(1).block(true, &TWO, 286, &[1]).zeros(0, 1).taken());
+        assert!(!end(2).block(true, &TWO, 286, &[1]).zeros(0, 1).taken());
+    }
+
     #[test]
     fn a_stream_holds_what_was_put_and_its_size_is_checked() {
         for (len, different) in [(1, 1), (7, 256), (65_536, 1), (65_536, 5), (65_536, 256), (524_288, 256)] {

@@ -219,8 +219,8 @@ impl LexiFeed {
         decoder.options.verify = self.options.verify_integers;
         let outline = decoder.outline(data_start);
         if let Some(range) = outline.ranges.iter().find(|range| range.bytes.is_empty()) {
-            let text =
-                format!("packed chunk {} has a range without bytes: no encoder writes it", range.chunk);
+            let (kind, chunk) = (range.kind, range.chunk);
+            let text = format!("packed.data: {kind} of chunk {chunk} has no bytes, and a lane has two words");
             return Err(checked.malformed(text));
         }
         Ok(Ranges::new(head, decoder, outline, data_start, &self.options))
