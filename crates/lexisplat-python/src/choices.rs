@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use lexisplat::packed::{PackOptions, Preset};
+use lexisplat::packed::{LOD_FIRST_LAYER, PackOptions, Preset};
 use lexisplat::{
     CompressOptions, DEFAULT_TOLERANCE, Dictionary, Layout, Limits, Pursuit, ShDegree, SplatSource, Splats,
     lexi,
@@ -46,6 +46,7 @@ pub(crate) struct Choices {
     beside: Option<PathBuf>,
     views: Option<String>,
     keep_order: bool,
+    lod: bool,
     keep_all: bool,
     max_gaussians: Option<usize>,
     guess: bool,
@@ -87,13 +88,14 @@ impl Choices {
     }
 
     /// Returns the choices that only packed files have, without the targets.
-    fn packed_only(&self) -> [Named; 6] {
+    fn packed_only(&self) -> [Named; 7] {
         [
             ("guess", self.guess),
             ("cameras", self.cameras.is_some()),
             ("views", self.views.is_some()),
             ("keep_order", self.keep_order),
             ("keep_all", self.keep_all),
+            ("lod", self.lod),
             ("max_gaussians", self.max_gaussians.is_some()),
         ]
     }
@@ -107,7 +109,7 @@ impl Choices {
         let goals = self.goals();
         (1..goals.len()).try_for_each(|k| refuse(&goals[..k], &goals[k..=k]))?;
         let [_, psnr, min_psnr, size, ratio] = goals;
-        let [guess, cameras, views, keep_order, keep_all, max_gaussians] = self.packed_only();
+        let [guess, cameras, views, keep_order, keep_all, _, max_gaussians] = self.packed_only();
         refuse(&[guess], &[psnr, min_psnr, size, ratio, cameras, views, max_gaussians])?;
         refuse(&[cameras], &[views])?;
         refuse(&[max_gaussians], &[keep_all, keep_order, ("tol", self.tol.is_some())])?;
@@ -128,7 +130,7 @@ impl Choices {
         if layout != Layout::Packed {
             return Ok(Compression::Exact(self.exact(layout, dictionary)?, layout.codes()));
         }
-        let options = pack_options(self.tol, self.atoms, self.keep_order, self.keep_all, self.seed);
+        let options = pack_options(self.tol, self.atoms, self.keep_order, self.keep_all, self.lod, self.seed);
         let preset = preset(self.preset.as_deref())?;
         if self.guess {
             return Ok(Compression::Guessed(preset, options));
@@ -177,6 +179,7 @@ pub(crate) fn pack_options(
     atoms: Option<usize>,
     keep_order: bool,
     keep_all: bool,
+    lod: bool,
     seed: u64,
 ) -> PackOptions {
     PackOptions::default()
@@ -184,6 +187,7 @@ pub(crate) fn pack_options(
         .with_atoms(atoms)
         .with_keep_order(keep_order)
         .with_keep_all(keep_all)
+        .with_lod(lod.then_some(LOD_FIRST_LAYER))
         .with_seed(seed)
 }
 

@@ -79,6 +79,7 @@ pub(crate) struct Choices {
     seed: u64,
     keep_order: bool,
     keep_all: bool,
+    lod: bool,
     guess: bool,
     device: String,
     drop_invalid: bool,
@@ -91,7 +92,7 @@ impl Choices {
     }
 
     fn options(&self) -> PackOptions {
-        pack_options(self.tol, self.atoms, self.keep_order, self.keep_all, self.seed)
+        pack_options(self.tol, self.atoms, self.keep_order, self.keep_all, self.lod, self.seed)
     }
 
     fn preset(&self) -> Result<Preset> {

@@ -24,6 +24,7 @@ from conftest import make, of_inria
     ("arguments", "options"),
     [
         (["--preset", "small", "--keep-order"], {"preset": "small", "keep_order": True}),
+        (["--guess", "--lod"], {"guess": True, "lod": True}),
         (["--psnr", "30", "--max-gaussians", "900"], {"psnr": 30, "max_gaussians": 900}),
         (["--ratio", "12", "--atoms", "40", "--seed", "7"], {"ratio": 12, "atoms": 40, "seed": 7}),
         (["--guess"], {"guess": True}),

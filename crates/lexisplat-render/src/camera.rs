@@ -1,5 +1,7 @@
 //! Pinhole cameras.
 
+use lexisplat::packed::Eye;
+
 use crate::conventions::NEAR_Z;
 use crate::error::{Error, Result};
 use crate::tile_set::TileSet;
@@ -95,6 +97,16 @@ impl Camera {
         };
         let (fx, fy) = (scale(self.fx, width, self.width), scale(self.fy, height, self.height));
         Self { width, height, fx, fy, tiles: None, ..self.clone() }
+    }
+
+    /// Returns the eye of this camera, for the choice of what is drawn within a budget. The cone holds the whole picture.
+    #[must_use]
+    pub fn eye(&self) -> Eye {
+        let aside = [self.width as f32 / self.fx, self.height as f32 / self.fy].map(|side| 0.5 * side);
+        Eye::at(self.position)
+            .with_forward(self.rotation.map(|row| row[2]))
+            .with_half_angle(aside[0].hypot(aside[1]).atan())
+            .with_pixel(1.0 / self.fx.max(self.fy))
     }
 
     /// Returns this camera with half the width and half the height. A tile set becomes the tiles of the smaller picture

@@ -66,6 +66,10 @@ pub(crate) struct Compress {
     /// packed files have an order of their own.
     #[arg(long)]
     pub(crate) keep_order: bool,
+    /// Add levels of detail to a large scene: layers of fewer Gaussians, of which readers draw far parts. A scene of 20
+    /// million Gaussians has 5 layers instead of 2. Each layer takes about 0.25 % more bytes.
+    #[arg(long)]
+    pub(crate) lod: bool,
     /// Keep all Gaussians. Without this option packing leaves out Gaussians whose effect on the pictures is not worth
     /// their bits. It then fits base colours and opacities to the pictures again, which makes up for the missing
     /// Gaussians and for rounding. --keep-order and --tol keep all Gaussians too.
@@ -155,7 +159,7 @@ impl Compress {
     }
 
     /// Returns the options that only packed files have, and for each whether it is given.
-    fn packed_only(&self) -> [(&'static str, bool); 11] {
+    fn packed_only(&self) -> [(&'static str, bool); 12] {
         [
             ("--guess", self.guess),
             ("--preset", self.preset.is_some()),
@@ -166,6 +170,7 @@ impl Compress {
             ("--cameras", self.cameras.is_some()),
             ("--views", self.views.is_some()),
             ("--keep-order", self.keep_order),
+            ("--lod", self.lod),
             ("--keep-all", self.keep_all),
             ("--max-gaussians", self.max_gaussians.is_some()),
         ]

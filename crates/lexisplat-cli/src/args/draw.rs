@@ -6,7 +6,7 @@ use clap::Args;
 use lexisplat_render::gpu::ShPath;
 
 use super::part::Part;
-use super::values::{sh_path, whole};
+use super::values::{sh_path, size, whole};
 use super::views::Views;
 
 /// Draw a scene to PNG files. A .lexi is drawn from its sparse codes, without dense SH.
@@ -19,6 +19,14 @@ pub(crate) struct Render {
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) part: Part,
+    /// Draw each view of a packed file with at most N Gaussians: near and visible parts in full, the others from the
+    /// layers that come first. Only the ranges of the file that a view needs are read, decoded and held. `compress --lod`
+    /// makes files for it.
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=u64::MAX), conflicts_with = "first")]
+    pub(crate) budget: Option<u64>,
+    /// With --budget, hold at most this many bytes of the file at a time, such as 16MB [default: no limit].
+    #[arg(long, value_name = "SIZE", value_parser = size, requires = "budget")]
+    pub(crate) budget_bytes: Option<u64>,
     #[command(flatten)]
     pub(crate) views: Views,
 }

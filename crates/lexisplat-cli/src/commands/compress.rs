@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result};
-use lexisplat::packed::{PackOptions, Preset, ReachedRecord, TargetRecord};
+use lexisplat::packed::{LOD_FIRST_LAYER, PackOptions, Preset, ReachedRecord, TargetRecord};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{
     CompressOptions, DEFAULT_TOLERANCE, Error, FileKind, FormatError, Joined, Layout, Limits, Record,
@@ -181,6 +181,7 @@ fn compression(args: &Compress, given: Option<&ViewSet>, limits: &Limits) -> Res
         .with_tolerance(args.tol)
         .with_atoms(args.atoms)
         .with_keep_order(args.keep_order)
+        .with_lod(args.lod.then_some(LOD_FIRST_LAYER))
         .with_keep_all(args.keep_all)
         .with_seed(args.seed);
     let preset = args.preset.unwrap_or_default();

@@ -4,13 +4,17 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::Progress;
-use lexisplat_render::RenderOptions;
-use serde_json::json;
+use lexisplat::lexi::{FeedOptions, LexiFeed, StreamedScene};
+use lexisplat::packed::{Budget, Eye};
+use lexisplat::{Error, Progress};
+use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
+use serde_json::{Map, Value, json};
 
 use crate::args::{Common, Render};
 use crate::device::open_renderer;
-use crate::files::{check_free, is_pipe, load_part, make_folder, tell, view_name, warn_of, write_picture};
+use crate::files::{
+    check_free, input, is_pipe, load_part, make_folder, tell, view_name, warn_of, write_picture,
+};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -18,45 +22,113 @@ use crate::stop::{self, Work};
 const STANDARD_INPUT_VIEWS: &str = "stdin-views";
 
 pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
-    let folder = args.output.clone().unwrap_or_else(|| folder_for(&args.file));
+    if let Some(splats) = args.budget {
+        return run_within(args, splats, common);
+    }
     let input = load_part(&args.file, &args.part, common)?;
     warn_of(&input);
     let scene = input.scene();
-    let views = &args.views;
-    let cameras = super::cameras(views, &scene)?;
+    let cameras = super::cameras(&args.views, &scene)?;
+    let mut renderer = open_renderer(args.views.device)?;
+    let prepared = renderer.prepare(scene)?;
+    let options = RenderOptions::default().with_background(args.views.background);
+    draw(args, common, &input.name, &cameras, &mut renderer, &mut |renderer, camera| {
+        let clock = Instant::now();
+        let picture = renderer.render(&prepared, camera, &options)?;
+        Ok((picture, clock.elapsed().as_secs_f64(), Map::new()))
+    })
+}
+
+/// Draws each view from the ranges of the file that it needs, with at most `splats` Gaussians.
+fn run_within(args: &Render, splats: u64, common: &Common) -> Result<()> {
+    let (name, bytes) = input(&args.file, common)?;
+    let feeding = FeedOptions::default().with_sh_parts(args.part.sh_parts.unwrap_or(usize::MAX));
+    let mut scene = StreamedScene::new(LexiFeed::new(&name, &feeding, &common.limits()?));
+    let budget = Budget::default().with_splats(splats).with_bytes(args.budget_bytes.unwrap_or(u64::MAX));
+    let fill = |scene: &mut StreamedScene, eye: &Eye| -> Result<u64> {
+        let mut read = 0;
+        while let Some(range) = scene.wants(eye, &budget) {
+            let place = usize::try_from(range.start)?..usize::try_from(range.end)?;
+            let found = bytes.get(place.clone()).or(bytes.get(place.start..)).unwrap_or_default();
+            if found.is_empty() {
+                let problem = lexisplat::FormatError::Truncated {
+                    what: "the file".to_owned(),
+                    expected: range.end,
+                    found: bytes.len() as u64,
+                };
+                return Err(Error::format(&name, problem).into());
+            }
+            scene.feed(range.start, found)?;
+            read += found.len() as u64;
+        }
+        scene.refresh()?;
+        Ok(read)
+    };
+    // What is first in the file shows where the scene is.
+    fill(&mut scene, &Eye::at([0.0; 3]))?;
+    let too_small = || Error::parameter("budget", splats, "enough for a chunk; `info` lists the layers");
+    let coarse = scene.model()?.ok_or_else(too_small)?;
+    let cameras = super::cameras(&args.views, &Scene::from(&coarse))?;
+    drop(coarse);
+    let mut renderer = open_renderer(args.views.device)?;
+    let options = RenderOptions::default().with_background(args.views.background);
+    draw(args, common, &name, &cameras, &mut renderer, &mut |renderer, camera| {
+        let read = fill(&mut scene, &camera.eye())?;
+        let mut words = Map::new();
+        words.insert("bytes_read".to_owned(), read.into());
+        words.insert("bytes_held".to_owned(), scene.source().held_bytes().into());
+        let model = scene.model()?.ok_or_else(too_small)?;
+        words.insert("gaussians".to_owned(), model.len().into());
+        let prepared = renderer.prepare(Scene::from(&model))?;
+        let clock = Instant::now();
+        let picture = renderer.render(&prepared, camera, &options)?;
+        Ok((picture, clock.elapsed().as_secs_f64(), words))
+    })
+}
+
+/// A function that draws a view. Returns the picture, the seconds of drawing, and what the report says of it beside.
+type DrawView<'a> = dyn FnMut(&mut Renderer, &Camera) -> Result<(Image, f64, Map<String, Value>)> + 'a;
+
+/// Draws all views, writes them and reports.
+fn draw(
+    args: &Render,
+    common: &Common,
+    name: &str,
+    cameras: &[Camera],
+    renderer: &mut Renderer,
+    draw_view: &mut DrawView<'_>,
+) -> Result<()> {
+    let folder = args.output.clone().unwrap_or_else(|| folder_for(&args.file));
     let paths: Vec<PathBuf> =
         cameras.iter().enumerate().map(|(i, c)| folder.join(view_name(i, cameras.len(), &c.name))).collect();
     for path in &paths {
         check_free(path, &[], common.overwrite)?;
     }
-    let mut renderer = open_renderer(views.device)?;
-    let prepared = renderer.prepare(scene)?;
     stop::while_writing(Work::Files(paths.len()));
     make_folder(&folder)?;
-    let options = RenderOptions::default().with_background(views.background);
     let bars = Bars::new(common.quiet);
     bars.start("drawing", "views", cameras.len() as u64);
     let mut done = Vec::new();
     let mut drawing = 0.0;
     for (camera, path) in cameras.iter().zip(&paths) {
-        let clock = Instant::now();
-        let picture = renderer.render(&prepared, camera, &options)?;
-        let seconds = clock.elapsed().as_secs_f64();
+        let (picture, seconds, words) = draw_view(renderer, camera)?;
         drawing += seconds;
         write_picture(path, &picture, common.overwrite)?;
         bars.advance(1);
-        done.push(json!({
+        let mut view = json!({
             "camera": camera.name,
             "file": path.display().to_string(),
             "width": picture.width,
             "height": picture.height,
             "milliseconds": seconds * 1000.0,
-        }));
+        });
+        view.as_object_mut().into_iter().for_each(|view| view.extend(words.clone()));
+        done.push(view);
     }
     bars.end();
     let (count, folder, device) = (cameras.len(), folder.display(), renderer.name());
     let each = drawing * 1000.0 / count as f64;
-    tell(common, json!({ "scene": input.name, "device": device, "views": done }), || {
+    tell(common, json!({ "scene": name, "device": device, "views": done }), || {
         Ok(format!("wrote {count} pictures to {folder}, each drawn in {each:.0} ms on average ({device})\n"))
     })
 }

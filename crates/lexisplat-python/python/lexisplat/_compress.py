@@ -39,12 +39,12 @@ _OPTIONS: dict[str, Callable[[str, Any], object]] = {
     **dict.fromkeys(["psnr", "min_psnr", "ratio", "tol"], number),
     **dict.fromkeys(["size", "memory"], bytes_of),
     **dict.fromkeys(["atoms", "sample", "max_gaussians"], count),
-    **dict.fromkeys(["keep_order", "keep_all", "guess"], flag),
+    **dict.fromkeys(["keep_order", "keep_all", "lod", "guess"], flag),
     "max_nonzeros": lambda name, value: count(name, value, BYTE),
     "seed": _seed,
 }
 #: Those that may not be ``None``.
-_NEEDED = ("seed", "keep_order", "keep_all", "guess", "memory")
+_NEEDED = ("seed", "keep_order", "keep_all", "lod", "guess", "memory")
 
 
 def options_of(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,6 +77,7 @@ def compress(
     seed: int = 0,
     keep_order: bool = False,
     keep_all: bool = False,
+    lod: bool = False,
     max_gaussians: int | None = None,
     guess: bool = False,
     memory: int | float | str = DEFAULT_MEMORY,
@@ -123,6 +124,9 @@ def compress(
         Whether packed files hold the order of the source.
     keep_all : bool
         Whether no Gaussian may be left out.
+    lod : bool
+        Whether a large scene has levels of detail: layers of fewer Gaussians, of which readers draw far parts. Each takes
+        about 0.25 % more bytes.
     max_gaussians : int, optional
         Most Gaussians in the file.
     guess : bool

@@ -30,11 +30,13 @@ pub(crate) use scene::SpilledPacked;
 
 pub use bitstream::stream::StreamBits;
 pub use curve::curve_order;
+pub use decode::budget::{Budget, Eye};
 pub use decode::outline::{ChunkOutline, LayerOutline, Outline, RangeKind, RangeOutline};
+pub use decode::selection::Selection;
 #[cfg(feature = "encode")]
 pub use encode::appearance::{Appearance, AppearanceChange};
 #[cfg(feature = "encode")]
-pub use encode::options::PackOptions;
+pub use encode::options::{LOD_FIRST_LAYER, PackOptions};
 #[cfg(feature = "encode")]
 pub use encode::pack::Packer;
 #[cfg(feature = "encode")]

@@ -10,4 +10,5 @@ mod order;
 mod promises;
 mod refusals;
 mod round_trips;
+mod streamed;
 mod support;

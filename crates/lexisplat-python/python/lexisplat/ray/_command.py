@@ -47,6 +47,7 @@ def parser() -> argparse.ArgumentParser:
     add("--seed", type=int, default=0, metavar="N", help="seed of the choice of Gaussians to learn from [0]")
     add("--keep-order", action="store_true", help="store the order of the source")
     add("--keep-all", action="store_true", help="leave no Gaussian out")
+    add("--lod", action="store_true", help="add levels of detail: layers of fewer Gaussians, for parts that are far")
     add("--guess", action="store_true", help="estimate what shows instead of drawing: several times faster, larger files")
     add("--device", default="cpu", help="what draws on the workers: cpu, gpu, auto or a number [cpu]")
     add("--one-each", action="store_true", help="write a file for each tile, with one dictionary")
@@ -85,7 +86,7 @@ def _run(given: argparse.Namespace) -> dict[str, Any]:
     here = {} if given.address else {"num_cpus": given.workers, "include_dashboard": False}
     ray.init(address=given.address or "local", log_to_driver=False, logging_level="error", **here)
     passed = (
-        "preset tol atoms seed keep_order keep_all guess device one_each skip_bad drop_invalid drop_extras overwrite threads"
+        "preset tol atoms seed keep_order keep_all lod guess device one_each skip_bad drop_invalid drop_extras overwrite threads"
     )
     options = {name: getattr(given, name) for name in passed.split()}
     with warnings.catch_warnings():

@@ -44,6 +44,7 @@ def compress(
     seed: int = 0,
     keep_order: bool = False,
     keep_all: bool = False,
+    lod: bool = False,
     guess: bool = False,
     device: str = "cpu",
     one_each: bool = False,
@@ -68,7 +69,7 @@ def compress(
         ``opacities``, ``sh0`` and ``shN`` as the attributes of :class:`lexisplat.Splats`.
     out : path
         The file to write, by the process that calls; with ``one_each`` a folder, where each tile's file has its name.
-    preset, tol, atoms, seed, keep_order, keep_all, guess, device
+    preset, tol, atoms, seed, keep_order, keep_all, lod, guess, device
         As :func:`lexisplat.compress`. ``device`` is that of the workers.
     one_each : bool
         Whether each tile becomes a file of its own. All have the dictionary, the steps and the tables of the whole scene.
@@ -102,7 +103,7 @@ def compress(
     for name, value in {**flags, **reading}.items():
         flag(name, value)
     asked = {"preset": preset, "tol": tol, "atoms": atoms, "seed": seed}
-    asked.update(keep_order=keep_order, keep_all=keep_all, guess=guess)
+    asked.update(keep_order=keep_order, keep_all=keep_all, lod=lod, guess=guess)
     choices = {**options_of(asked), **reading, "device": device_of(device)}
     limits, threads = limits_of(limit), count("threads", threads)
     listed = tiles_of(tiles)

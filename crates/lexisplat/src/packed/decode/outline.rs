@@ -44,6 +44,9 @@ pub struct ChunkOutline {
     /// Coordinates that are at most the least, and at least the largest, of the centres of its Gaussians. Zeros if it is
     /// the only chunk of the file.
     pub bounds: [[f32; 3]; 2],
+    /// Indices of the chunks of the next layer around it in [`Outline::chunks`]. While one of them is missing, some of its
+    /// Gaussians are drawn so that they fill the place. None in the last layer.
+    pub next: Range<usize>,
 }
 
 /// A range: bytes of a chunk that are fetched, verified and decoded together.
@@ -115,7 +118,7 @@ impl Outline {
                 layer.gaussians += chunk.gaussians as u64;
             }
             let (first, gaussians, bounds) = (chunk.first, chunk.gaussians, chunk.bounds);
-            chunks.push(ChunkOutline { layer: chunk.layer, first, gaussians, bounds });
+            chunks.push(ChunkOutline { layer: chunk.layer, first, gaussians, bounds, next: index.around(c) });
         }
         let range = |place: &crate::packed::bitstream::Place| {
             let (chunk, kind) = (place.chunk as usize, usize::from(place.kind));

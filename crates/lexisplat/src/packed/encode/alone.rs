@@ -50,8 +50,8 @@ impl Alone {
         let mut start = 0;
         for (layer, count) in layers.iter().enumerate().take(alone.layers) {
             let end = start + count;
-            let missing = missing(g, places, end);
-            for (i, x) in (start..end).zip(missing.into_iter().skip(start)) {
+            let missing = missing(g, &places[start..], *count);
+            for (i, x) in (start..end).zip(missing) {
                 let rare = libm::log(probability(layer, i).max(f64::MIN_POSITIVE));
                 let grows = GROWTH * libm::log1p(MISSING * x) + RARE * rare;
                 alone.growth.push(steps(grows.clamp(0.0, MOST_GROWTH * STEPS[0]), STEPS[0]));

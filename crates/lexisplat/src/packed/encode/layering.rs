@@ -2,12 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::options::PackOptions;
 use crate::packed::bitstream::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
 /// Least number of Gaussians of a scene with two layers, by default. Smaller scenes have small files.
 pub(in crate::packed) const LEAST_LAYERED: usize = 8000;
-/// Share of the Gaussians in each layer but the last, for scenes with several layers.
-const SHARES: [f64; 1] = [0.14];
+/// Share of the Gaussians that are not in the last layer, for scenes with several layers.
+const COARSE_SHARE: f64 = 0.14;
+/// Share of the Gaussians of a first layer that stay in it when it is divided in two, for levels of detail.
+const DIVIDED_SHARE: f64 = 0.2;
+/// Most layers. A reader takes eight.
+const MOST_LAYERS: usize = 8;
 /// Power of the energy to which the probability of a layer is proportional. The energy of a Gaussian is the squared change
 /// of pictures without it. With a power of 1 the Gaussians that show most would stand alone, with holes between them
 /// (docs/METHOD.md, "Layers").
@@ -23,10 +28,9 @@ const CHUNKS: usize = 6;
 const REST: usize = 2;
 /// Smallest size of a nonzero in each part of SH-rest, in steps, for scenes with several layers.
 const PARTS: [u32; 3] = [12, 6, 1];
-/// Number of refinements of each layer, for scenes with several layers.
-const LEVELS: [u8; LAYERS] = [2, 1];
-/// Number of layers of a scene with several layers.
-const LAYERS: usize = SHARES.len() + 1;
+/// Number of refinements of the first layer and of each other layer, for scenes with several layers.
+const FIRST_LEVELS: u8 = 2;
+const LEVELS: u8 = 1;
 
 /// The layers of a file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -40,20 +44,21 @@ pub(in crate::packed) struct Layering {
 }
 
 impl Layering {
-    /// Creates the layers of a scene of `gaussians` Gaussians. There is one layer if `gaussians` is below `layers_from`.
-    /// `energies` holds the energies of a sample of the Gaussians, and the number of Gaussians that each stands for.
+    /// Creates the layers of a scene of `gaussians` Gaussians, as `options` ask for. `energies` holds the energies of a sample
+    /// of the Gaussians, and the number of Gaussians that each stands for.
     pub(in crate::packed) fn new(
         gaussians: usize,
-        layers_from: usize,
+        options: &PackOptions,
         energies: impl Iterator<Item = (f32, u64)>,
     ) -> Self {
         let mut factors = Vec::new();
-        if gaussians >= layers_from.max(1) {
+        let shares = shares(gaussians, options.lod);
+        if gaussians >= options.layers_from.max(1) {
             let powers: Vec<(f64, f64)> =
                 energies.map(|(energy, count)| (power(energy), count as f64)).collect();
             // The probability with which each Gaussian is in none of the layers so far.
             let mut left = vec![1.0; powers.len()];
-            for share in SHARES {
+            for &share in &shares {
                 let factor = factor(share, &powers, &left);
                 left.iter_mut()
                     .zip(&powers)
@@ -62,8 +67,8 @@ impl Layering {
             }
         }
         let count = factors.len();
-        let last = 1.0 - SHARES.iter().sum::<f64>();
-        let shares = SHARES.into_iter().chain([last]);
+        let last = 1.0 - shares.iter().sum::<f64>();
+        let shares = shares.into_iter().chain([last]);
         let size = |share: f64| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
             let count = (share * gaussians as f64) as usize;
@@ -94,8 +99,9 @@ impl Layering {
 
     /// Returns the form of each layer, with `parts` parts of SH-rest.
     pub(in crate::packed) fn forms(&self, parts: usize) -> Vec<LayerForm> {
-        let levels: &[u8] = if self.layers() > 1 { &LEVELS } else { &[0] };
-        layer_forms(levels, parts, self.layers() > 1)
+        let mut levels = vec![LEVELS; self.layers()];
+        levels[0] = if self.layers() > 1 { FIRST_LEVELS } else { 0 };
+        layer_forms(&levels, parts, self.layers() > 1)
     }
 
     /// Returns the probability with which a Gaussian that is in no earlier layer is drawn into `layer`.
@@ -223,6 +229,18 @@ fn overlapping(chunks: &[Chunk], own: usize, layer: usize) -> impl Iterator<Item
     let cells = chunks[own].cell..end(own);
     let of = (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
     of.filter(move |&c| chunks[c].cell <= cells.end && end(c) >= cells.start)
+}
+
+/// Returns the share of the Gaussians in each layer but the last, if the first layer has at most `most` Gaussians.
+fn shares(gaussians: usize, most: Option<usize>) -> Vec<f64> {
+    let mut first = COARSE_SHARE;
+    let mut others = Vec::new();
+    let is_above = |first: f64| most.is_some_and(|most| first * gaussians as f64 > most as f64);
+    while is_above(first) && others.len() + 2 < MOST_LAYERS {
+        others.insert(0, (1.0 - DIVIDED_SHARE) * first);
+        first *= DIVIDED_SHARE;
+    }
+    [vec![first], others].concat()
 }
 
 /// Returns the number to which the probability of a Gaussian is proportional, as long as it is below 1.

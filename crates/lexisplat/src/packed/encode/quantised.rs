@@ -96,7 +96,7 @@ impl<'a> Quantised<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let n = gaussians.scene.len();
-        let layering = Layering::new(n, options.layers_from, gaussians.weights.iter().map(|w| (w[1], 1)));
+        let layering = Layering::new(n, options, gaussians.weights.iter().map(|w| (w[1], 1)));
         let view = OrderedGaussians::new(splats, &gaussians.scene, &gaussians.classes);
         let clock = Stopwatch::start();
         let coder = ChunkCoder::new(view, parameters, mean_view, options, progress)?;

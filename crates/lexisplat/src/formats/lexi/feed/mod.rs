@@ -1,9 +1,11 @@
 //! Reading a packed file from bytes as they come.
 
 mod elsewhere;
+mod look;
 mod options;
 mod ranges;
 mod run;
+mod streamed;
 
 use std::ops::Range;
 
@@ -22,6 +24,7 @@ use crate::support::limits::Limits;
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 
 pub use self::options::FeedOptions;
+pub use self::streamed::StreamedScene;
 
 /// Bytes that are asked for first: the length of the header, and the first byte of it, by which a .lexi is known.
 const FIRST_BYTES: usize = LENGTH_BYTES + 1;

@@ -52,8 +52,9 @@ impl Ranges {
                 ranges.push(r);
             }
         }
-        let wanted =
-            |range: &RangeOutline| is_asked_for(range, options) && is_near(&outline, range.chunk, options);
+        let wanted = |range: &RangeOutline| {
+            is_asked_for(range.kind, options) && is_near(&outline, range.chunk, options)
+        };
         let state = |range| if wanted(range) { State::Missing } else { State::Unwanted };
         let states = outline.ranges.iter().map(state).collect();
         let order = order(&outline, options);
@@ -186,10 +187,30 @@ impl Ranges {
         }
     }
 
+    /// Holds and asks for the ranges `chosen` alone, in this order.
+    pub(super) fn hold(&mut self, chosen: &[usize]) {
+        let mut is_chosen = vec![false; self.states.len()];
+        for &r in chosen {
+            is_chosen.iter_mut().skip(r).take(1).for_each(|chosen| *chosen = true);
+        }
+        for (state, is_chosen) in self.states.iter_mut().zip(is_chosen) {
+            match (&*state, is_chosen) {
+                (State::Unwanted | State::Gone, true) => *state = State::Missing,
+                (State::Part(run) | State::Whole(run), false) => {
+                    self.held -= run.len() as u64;
+                    *state = State::Unwanted;
+                }
+                (State::Missing | State::Gone, false) => *state = State::Unwanted,
+                _ => {}
+            }
+        }
+        self.order = chosen.to_vec();
+    }
+
     /// Asks for chunk `c`.
     pub(super) fn want(&mut self, c: usize, options: &FeedOptions) {
         for &r in self.of_chunk.get(c).map(Vec::as_slice).unwrap_or_default() {
-            let asked_for = self.outline.ranges.get(r).is_some_and(|range| is_asked_for(range, options));
+            let asked_for = self.outline.ranges.get(r).is_some_and(|range| is_asked_for(range.kind, options));
             if let Some(state) = self.states.get_mut(r)
                 && asked_for
                 && matches!(state, State::Unwanted | State::Gone)
@@ -250,8 +271,8 @@ impl AvailableRanges for Ranges {
 }
 
 /// Whether the options ask for ranges of this kind.
-fn is_asked_for(range: &RangeOutline, options: &FeedOptions) -> bool {
-    !matches!(range.kind, RangeKind::Sh(part) if part >= options.sh_parts)
+pub(super) fn is_asked_for(kind: RangeKind, options: &FeedOptions) -> bool {
+    !matches!(kind, RangeKind::Sh(part) if part >= options.sh_parts)
 }
 
 /// Whether the options ask for chunk `c`.

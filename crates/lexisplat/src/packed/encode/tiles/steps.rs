@@ -57,7 +57,7 @@ impl Steps {
         let stop = promise(&mut parameters, plan.options.tolerance);
         let of_file = kept.iter().sum::<u64>() / plan.files().len().max(1) as u64;
         let of_file = usize::try_from(of_file).unwrap_or(usize::MAX);
-        let layering = Layering::new(of_file, plan.options.layers_from, all.energies.iter());
+        let layering = Layering::new(of_file, &plan.options, all.energies.iter());
         Ok(Self {
             scene: plan.scene(),
             steps,
