@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A flight through a scene of many millions of Gaussians within a budget, against all Gaussians drawn.
 
-    python3 benches/lod.py MODEL.ply CAMERAS.json FOLDER [--copies 53] [--views 100] [--budget 1000000 ...] [--width 640]
+    python3 benches/lod.py MODEL.ply CAMERAS.json FOLDER [--copies 66] [--views 100] [--budget 1000000 ...] [--width 640]
         [--binary LEXISPLAT]
 
 Copies of the model, without what lies beyond the others, are packed with `compress --guess`, with `--lod` and without.
@@ -39,8 +39,8 @@ def run(*command):
 def tile(model, copies, target):
     """Write copies of a model side by side, without what lies beyond them, and return how far apart they are in x and z.
 
-    Of each axis a copy holds the middle 98 percent, and of these no Gaussian larger than a quarter of its width. So no
-    copy has Gaussians in another one, where they would hide what is seen there.
+    Of each axis a copy holds the middle 90 percent, and of these no Gaussian larger than an eighth of its width. So few
+    Gaussians reach into another copy, where they would hide what is seen there.
     """
     data = model.read_bytes()
     end = data.index(b"end_header\n") + len(b"end_header\n")
@@ -48,10 +48,10 @@ def tile(model, copies, target):
     names = [line.split()[2] for line in lines if line.startswith("property float ")]
     rows = np.frombuffer(data[end:], "<f4").reshape(-1, len(names))
     place, size = ([names.index(f"{stem}{k}") for k in of] for stem, of in (("", "xyz"), ("scale_", "012")))
-    least, most = np.quantile(rows[:, place], [0.01, 0.99], axis=0)
+    least, most = np.quantile(rows[:, place], [0.05, 0.95], axis=0)
     sides = (most - least)[[0, 2]]
     inside = ((rows[:, place] >= least) & (rows[:, place] <= most)).all(1)
-    kept = rows[inside & (np.exp(rows[:, size].max(1)) < sides.min() / 4)].copy()
+    kept = rows[inside & (np.exp(rows[:, size].max(1)) < sides.min() / 8)].copy()
     if target.exists():
         return sides
     header = data[:end].replace(b"element vertex %d" % len(rows), b"element vertex %d" % (len(kept) * copies))
@@ -94,7 +94,7 @@ def main():
     parser.add_argument("model", type=Path)
     parser.add_argument("cameras", type=Path)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--copies", type=int, default=53)
+    parser.add_argument("--copies", type=int, default=66)
     parser.add_argument("--views", type=int, default=100)
     parser.add_argument("--budget", type=int, nargs="+", default=[1_000_000])
     parser.add_argument("--width", type=int, default=640)

@@ -256,7 +256,7 @@ mod tests {
         let eye = |pixel| Eye::at([-1000.0, 5.0, 5.0]).with_pixel(pixel);
         let splats = |pixel| select(&eye(pixel), &Budget::default()).splats;
         assert_eq!([splats(0.0), splats(1e-6), splats(0.1)], [2100, 2100, 100]);
-        let some: Vec<u64> = (1..100).map(|k| splats(0.0001 * f64::from(k) as f32)).collect();
+        let some: Vec<u64> = (1..100).map(|k| splats(0.0001 * k as f32)).collect();
         assert!(some.is_sorted_by(|a, b| a >= b) && some.contains(&500));
     }
 
