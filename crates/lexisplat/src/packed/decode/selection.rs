@@ -4,15 +4,18 @@ use super::budget::{Budget, Eye};
 use super::outline::{ChunkOutline, Outline, RangeKind};
 use crate::support::order::order;
 
-/// Factor on the need for detail of a chunk outside the cone of view. Such chunks stay coarse, and are there when the eye
-/// turns.
-const BESIDE: f32 = 0.125;
+/// Least factor on the need for detail of a chunk by the share of it that is in the cone of view. Chunks beside the cone stay
+/// coarse, and are there when the eye turns.
+const BESIDE: f32 = 1.0 / 32.0;
 /// Factor on the need for the ranges of a chunk that are not needed at once: refinements, and SH-rest of smaller values.
 const FINE: f32 = 0.25;
 
 /// Share of the radius of a chunk's bounds that counts as a distance to it, beside the distance to the bounds: its Gaussians
 /// are spread within, and few of them lie at the nearest point.
-const SPREAD: f32 = 0.25;
+const SPREAD: f32 = 0.15;
+
+/// Number of points along each axis of a chunk's bounds by which the share of the chunk in the cone of view is estimated.
+const POINTS: usize = 4;
 
 /// The chunks to draw, and the ranges to hold of them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -44,7 +47,8 @@ impl Outline {
     /// Chooses the chunks that `eye` sees, as finely as `budget` allows.
     ///
     /// The first layer comes first, near chunks before far ones. Then a chunk comes the sooner, the farther apart the
-    /// Gaussians of the layers before it are seen to be where it lies. A chunk is chosen only with all chunks of the layer
+    /// Gaussians of the layers before it are seen to be where it lies, and the more of it is seen. A chunk is chosen only
+    /// with all chunks of the layer
     /// before it that lie around it. So where a chunk is missing, the Gaussians of those layers stand for it
     /// ([`ChunkOutline::next`]). A step for which there is no room is left out, and smaller ones may follow.
     ///
@@ -119,25 +123,27 @@ impl Outline {
             })
             .collect();
         let mut steps: Vec<Step> = Vec::with_capacity(2 * self.chunks.len());
-        let mut most = vec![f32::INFINITY; self.chunks.len()];
-        for (c, chunk) in self.chunks.iter().enumerate() {
-            let Sight { distance, is_inside } = sight(chunk, eye);
-            let spacing = spacing(chunk, ratios.get(chunk.layer).copied().unwrap_or(0.0));
-            let angle = spacing / distance.max(f32::MIN_POSITIVE);
-            let weight = if is_inside { 1.0 } else { BESIDE };
-            // Chunks of one layer do not come before those of the layer before, whatever their bounds are.
+        let mut needs = vec![0.0_f32; self.chunks.len()];
+        // Chunks of later layers have larger numbers.
+        for (c, chunk) in self.chunks.iter().enumerate().rev() {
+            let Sight { distance, share } = sight(chunk, eye);
+            let spacing = |ratio: f32| spacing(chunk, ratio) / distance.max(f32::MIN_POSITIVE);
+            let angle = spacing(ratios.get(chunk.layer).copied().unwrap_or(0.0));
+            let weight = share.sqrt().max(BESIDE);
             let first = chunk.layer == 0;
-            let own =
-                if first { f32::INFINITY } else { (weight * angle).min(most.get(c).copied().unwrap_or(0.0)) };
-            let next = most.get_mut(chunk.next.clone()).unwrap_or_default();
-            next.iter_mut().for_each(|most| *most = most.min(own));
-            // The Gaussians of the chunk itself are closer to each other.
-            let fine = FINE * weight * self::spacing(chunk, 1.0) / distance.max(f32::MIN_POSITIVE);
-            let distance = distance / weight;
-            if first || angle >= eye.pixel {
-                let step = Step { chunk: c, layer: chunk.layer, is_fine: false, need: own, distance };
-                steps.extend([step, Step { is_fine: true, need: fine.min(own), ..step }]);
+            if !first && angle < eye.pixel {
+                continue;
             }
+            // What lies around it in the next layer cannot come without it.
+            let next = needs.get(chunk.next.clone()).unwrap_or_default();
+            let need = next.iter().copied().fold(weight * angle, f32::max);
+            let need = if first { f32::INFINITY } else { need };
+            needs.iter_mut().skip(c).take(1).for_each(|of_chunk| *of_chunk = need);
+            let distance = distance / weight;
+            let step = Step { chunk: c, layer: chunk.layer, is_fine: false, need, distance };
+            // The Gaussians of the chunk itself are closer to each other.
+            let fine = (FINE * weight * spacing(1.0)).min(need);
+            steps.extend([step, Step { is_fine: true, need: fine, ..step }]);
         }
         steps
     }
@@ -147,8 +153,8 @@ impl Outline {
 struct Sight {
     /// Distance from the eye to the Gaussians of the chunk, about.
     distance: f32,
-    /// Whether a part of it may lie in the cone of view.
-    is_inside: bool,
+    /// Share of its bounds that the cone of view holds.
+    share: f32,
 }
 
 fn sight(chunk: &ChunkOutline, eye: &Eye) -> Sight {
@@ -156,18 +162,20 @@ fn sight(chunk: &ChunkOutline, eye: &Eye) -> Sight {
     let square = |v: [f32; 3]| v.iter().map(|x| x * x).sum::<f32>();
     let outside =
         std::array::from_fn(|k| (least[k] - eye.position[k]).max(eye.position[k] - most[k]).max(0.0));
-    // The sphere around the bounds, seen from the eye.
     let radius = 0.5 * square(std::array::from_fn(|k| most[k] - least[k])).sqrt();
     let distance = (square(outside) + (SPREAD * radius).powi(2)).sqrt();
-    let way: [f32; 3] = std::array::from_fn(|k| 0.5 * (least[k] + most[k]) - eye.position[k]);
-    let far = square(way).sqrt();
-    let is_inside = eye.forward.is_none_or(|forward| {
-        let along = (0..3).map(|k| way[k] * forward[k]).sum::<f32>() / square(forward).sqrt();
-        // Without a direction, or within the sphere, the angles are no numbers.
-        let off = libm::acosf((along / far).clamp(-1.0, 1.0)) - libm::asinf((radius / far).min(1.0));
-        !(far > radius && off > eye.half_angle)
-    });
-    Sight { distance, is_inside }
+    let Some(forward) = eye.forward else { return Sight { distance, share: 1.0 } };
+    let limit = libm::cosf(eye.half_angle.clamp(0.0, std::f32::consts::PI)) * square(forward).sqrt();
+    let is_inside = |point: &usize| {
+        let place = [point % POINTS, point / POINTS % POINTS, point / (POINTS * POINTS)];
+        let way: [f32; 3] = std::array::from_fn(|k| {
+            let part = (place[k] as f32 + 0.5) / POINTS as f32;
+            least[k] + part * (most[k] - least[k]) - eye.position[k]
+        });
+        (0..3).map(|k| way[k] * forward[k]).sum::<f32>() >= limit * square(way).sqrt()
+    };
+    let inside = (0..POINTS.pow(3)).filter(is_inside).count();
+    Sight { distance, share: inside as f32 / POINTS.pow(3) as f32 }
 }
 
 /// Returns how far apart the Gaussians of earlier layers are within the bounds of `chunk`, which has `ratio` times as many
