@@ -14,30 +14,19 @@ and what is there is not made again.
 
 import argparse
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-ROOT = Path(__file__).parent.parent
-
-
-def run(*command):
-    """Return what a command prints, and its largest memory in MiB."""
-    with subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True) as process:
-        told = process.stdout.read()
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        sys.exit(f"{' '.join(map(str, command))}: exit code {process.returncode}")
-    return told, used.ru_maxrss / 1024
+sys.dont_write_bytecode = True  # no __pycache__ in the working tree
+from real_models import ROOT  # noqa: E402
+from sizes import run  # noqa: E402
 
 
 def tile(model, copies, target):
-    """Write copies of a model side by side, without what lies beyond them, and return how far apart they are in x and z.
+    """Return how far apart copies of a model are in x and z, and write them to the target if there is one.
 
     Of each axis a copy holds the middle 90 percent, and of these no Gaussian larger than an eighth of its width. So few
     Gaussians reach into another copy, where they would hide what is seen there.
@@ -52,7 +41,7 @@ def tile(model, copies, target):
     sides = (most - least)[[0, 2]]
     inside = ((rows[:, place] >= least) & (rows[:, place] <= most)).all(1)
     kept = rows[inside & (np.exp(rows[:, size].max(1)) < sides.min() / 8)].copy()
-    if target.exists():
+    if target is None:
         return sides
     header = data[:end].replace(b"element vertex %d" % len(rows), b"element vertex %d" % (len(kept) * copies))
     side = int(np.ceil(np.sqrt(copies)))
@@ -102,30 +91,33 @@ def main():
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
     big, packed = args.folder / f"{args.copies}.ply", args.folder / f"{args.copies}.lexi"
-    sides = tile(args.model, args.copies, big)
-    for file, more in (packed, ["--lod"]), (args.folder / f"{args.copies}-plain.lexi", []):
-        if not file.exists():
-            run(args.binary, "compress", big, "-o", file, "--guess", "-q", *more)
+    files = {packed: ["--lod"], args.folder / f"{args.copies}-plain.lexi": []}
+    missing = [file for file in files if not file.exists()]
+    sides = tile(args.model, args.copies, big if missing else None)
+    for file in missing:
+        run([args.binary, "compress", big, "-o", file, "--guess", "-q", *files[file]])
+    big.unlink(missing_ok=True)
+    for file, more in files.items():
         print(f"{' '.join(['compress --guess', *more])}: {file.stat().st_size:,} bytes")
     views = args.folder / f"path-{args.copies}-{args.views}.json"
     views.write_text(json.dumps(path(json.loads(args.cameras.read_text()), sides, args.copies, args.views)))
     draw = [args.binary, "render", packed, "--cameras", views, "--width", args.width, "-q", "--json", "--overwrite"]
     whole = args.folder / f"whole-{args.copies}-{args.views}-{args.width}"
     if not whole.exists():
-        run(*draw, "-o", whole)
-    described = json.loads(run(args.binary, "info", packed, "--json")[0])
+        run([*draw, "-o", whole])
+    described = json.loads(run([args.binary, "info", packed, "--json"])[0])
     print(f"{described['gaussians']:,} Gaussians in {packed.stat().st_size:,} bytes, {args.views} views\n")
     print("| budget | Gaussians drawn | bytes read for a view | bytes held | PSNR, mean / least | largest memory |")
     print("|---" * 6 + "|")
     for budget in args.budget:
         folder = args.folder / f"budget-{budget}"
-        told, memory = run(*draw, "-o", folder, "--budget", budget)
+        told, _, _, memory = run([*draw, "-o", folder, "--budget", budget])
         found = json.loads(told)["views"]
         scores = [psnr(whole / Path(view["file"]).name, view["file"]) for view in found]
         read = [view["bytes_read"] for view in found]
         print(
             f"| {budget:,} | {max(view['gaussians'] for view in found):,} | {np.mean(read):,.0f}, {max(read):,} at most "
-            f"| {max(view['bytes_held'] for view in found):,} | {np.mean(scores):.2f} / {min(scores):.2f} dB | {memory:,.0f} MiB |"
+            f"| {max(view['bytes_held'] for view in found):,} | {np.mean(scores):.2f} / {min(scores):.2f} dB | {memory / 2**20:,.0f} MiB |"
         )
 
 

@@ -6,8 +6,8 @@ use std::time::Instant;
 use anyhow::Result;
 use lexisplat::lexi::{FeedOptions, LexiFeed, StreamedScene};
 use lexisplat::packed::{Budget, Eye};
-use lexisplat::{Error, Progress};
-use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
+use lexisplat::{Error, FormatError, Progress};
+use lexisplat_render::{Camera, Image, Prepared, RenderOptions, Renderer, Scene};
 use serde_json::{Map, Value, json};
 
 use crate::args::{Common, Render};
@@ -29,13 +29,12 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     warn_of(&input);
     let scene = input.scene();
     let cameras = super::cameras(&args.views, &scene)?;
+    let pictures = Pictures::new(args, common, &input.name, cameras)?;
     let mut renderer = open_renderer(args.views.device)?;
     let prepared = renderer.prepare(scene)?;
     let options = RenderOptions::default().with_background(args.views.background);
-    draw(args, common, &input.name, &cameras, &mut renderer, &mut |renderer, camera| {
-        let clock = Instant::now();
-        let picture = renderer.render(&prepared, camera, &options)?;
-        Ok((picture, clock.elapsed().as_secs_f64(), Map::new()))
+    pictures.draw(&mut renderer, &mut |renderer, camera| {
+        Ok((timed(renderer, &prepared, camera, &options)?, Map::new()))
     })
 }
 
@@ -51,7 +50,7 @@ fn run_within(args: &Render, splats: u64, common: &Common) -> Result<()> {
             let place = usize::try_from(range.start)?..usize::try_from(range.end)?;
             let found = bytes.get(place.clone()).or(bytes.get(place.start..)).unwrap_or_default();
             if found.is_empty() {
-                let problem = lexisplat::FormatError::Truncated {
+                let problem = FormatError::Truncated {
                     what: "the file".to_owned(),
                     expected: range.end,
                     found: bytes.len() as u64,
@@ -64,15 +63,16 @@ fn run_within(args: &Render, splats: u64, common: &Common) -> Result<()> {
         scene.refresh()?;
         Ok(read)
     };
-    // What is first in the file shows where the scene is.
+    // The first layer shows where the scene is.
     fill(&mut scene, &Eye::at([0.0; 3]))?;
     let too_small = || Error::parameter("budget", splats, "enough for a chunk; `info` lists the layers");
     let coarse = scene.model()?.ok_or_else(too_small)?;
     let cameras = super::cameras(&args.views, &Scene::from(&coarse))?;
     drop(coarse);
+    let pictures = Pictures::new(args, common, &name, cameras)?;
     let mut renderer = open_renderer(args.views.device)?;
     let options = RenderOptions::default().with_background(args.views.background);
-    draw(args, common, &name, &cameras, &mut renderer, &mut |renderer, camera| {
+    pictures.draw(&mut renderer, &mut |renderer, camera| {
         let read = fill(&mut scene, &camera.eye())?;
         let mut words = Map::new();
         words.insert("bytes_read".to_owned(), read.into());
@@ -80,57 +80,83 @@ fn run_within(args: &Render, splats: u64, common: &Common) -> Result<()> {
         let model = scene.model()?.ok_or_else(too_small)?;
         words.insert("gaussians".to_owned(), model.len().into());
         let prepared = renderer.prepare(Scene::from(&model))?;
-        let clock = Instant::now();
-        let picture = renderer.render(&prepared, camera, &options)?;
-        Ok((picture, clock.elapsed().as_secs_f64(), words))
+        Ok((timed(renderer, &prepared, camera, &options)?, words))
     })
 }
 
-/// A function that draws a view. Returns the picture, the seconds of drawing, and what the report says of it beside.
-type DrawView<'a> = dyn FnMut(&mut Renderer, &Camera) -> Result<(Image, f64, Map<String, Value>)> + 'a;
+/// A picture, and the seconds of drawing it.
+type Timed = (Image, f64);
 
-/// Draws all views, writes them and reports.
-fn draw(
-    args: &Render,
-    common: &Common,
-    name: &str,
-    cameras: &[Camera],
+fn timed(
     renderer: &mut Renderer,
-    draw_view: &mut DrawView<'_>,
-) -> Result<()> {
-    let folder = args.output.clone().unwrap_or_else(|| folder_for(&args.file));
-    let paths: Vec<PathBuf> =
-        cameras.iter().enumerate().map(|(i, c)| folder.join(view_name(i, cameras.len(), &c.name))).collect();
-    for path in &paths {
-        check_free(path, &[], common.overwrite)?;
+    prepared: &Prepared<'_>,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Result<Timed> {
+    let clock = Instant::now();
+    let picture = renderer.render(prepared, camera, options)?;
+    Ok((picture, clock.elapsed().as_secs_f64()))
+}
+
+/// A function that draws a view. Returns the picture, and members that the report of the view has beside the usual ones.
+type DrawView<'a> = dyn FnMut(&mut Renderer, &Camera) -> Result<(Timed, Map<String, Value>)> + 'a;
+
+/// The pictures to make, whose files may be written.
+struct Pictures<'a> {
+    common: &'a Common,
+    scene: &'a str,
+    cameras: Vec<Camera>,
+    folder: PathBuf,
+    paths: Vec<PathBuf>,
+}
+
+impl<'a> Pictures<'a> {
+    /// Refuses files that are there, before anything is prepared for drawing.
+    fn new(args: &Render, common: &'a Common, scene: &'a str, cameras: Vec<Camera>) -> Result<Self> {
+        let folder = args.output.clone().unwrap_or_else(|| folder_for(&args.file));
+        let name = |(i, camera): (usize, &Camera)| folder.join(view_name(i, cameras.len(), &camera.name));
+        let paths: Vec<PathBuf> = cameras.iter().enumerate().map(name).collect();
+        for path in &paths {
+            check_free(path, &[], common.overwrite)?;
+        }
+        Ok(Self { common, scene, cameras, folder, paths })
     }
-    stop::while_writing(Work::Files(paths.len()));
-    make_folder(&folder)?;
-    let bars = Bars::new(common.quiet);
-    bars.start("drawing", "views", cameras.len() as u64);
-    let mut done = Vec::new();
-    let mut drawing = 0.0;
-    for (camera, path) in cameras.iter().zip(&paths) {
-        let (picture, seconds, words) = draw_view(renderer, camera)?;
-        drawing += seconds;
-        write_picture(path, &picture, common.overwrite)?;
-        bars.advance(1);
-        let mut view = json!({
-            "camera": camera.name,
-            "file": path.display().to_string(),
-            "width": picture.width,
-            "height": picture.height,
-            "milliseconds": seconds * 1000.0,
-        });
-        view.as_object_mut().into_iter().for_each(|view| view.extend(words.clone()));
-        done.push(view);
+
+    /// Draws all views, writes them and reports.
+    fn draw(self, renderer: &mut Renderer, draw_view: &mut DrawView<'_>) -> Result<()> {
+        let Self { common, scene, cameras, folder, paths } = self;
+        stop::while_writing(Work::Files(paths.len()));
+        make_folder(&folder)?;
+        let bars = Bars::new(common.quiet);
+        bars.start("drawing", "views", cameras.len() as u64);
+        let mut done = Vec::new();
+        let mut drawing = 0.0;
+        for (camera, path) in cameras.iter().zip(&paths) {
+            let ((picture, seconds), more) = draw_view(renderer, camera)?;
+            drawing += seconds;
+            write_picture(path, &picture, common.overwrite)?;
+            bars.advance(1);
+            let mut view = json!({
+                "camera": camera.name,
+                "file": path.display().to_string(),
+                "width": picture.width,
+                "height": picture.height,
+                "milliseconds": seconds * 1000.0,
+            });
+            if let Value::Object(view) = &mut view {
+                view.extend(more);
+            }
+            done.push(view);
+        }
+        bars.end();
+        let (count, folder, device) = (cameras.len(), folder.display(), renderer.name());
+        let each = drawing * 1000.0 / count as f64;
+        tell(common, json!({ "scene": scene, "device": device, "views": done }), || {
+            Ok(format!(
+                "wrote {count} pictures to {folder}, each drawn in {each:.0} ms on average ({device})\n"
+            ))
+        })
     }
-    bars.end();
-    let (count, folder, device) = (cameras.len(), folder.display(), renderer.name());
-    let each = drawing * 1000.0 / count as f64;
-    tell(common, json!({ "scene": name, "device": device, "views": done }), || {
-        Ok(format!("wrote {count} pictures to {folder}, each drawn in {each:.0} ms on average ({device})\n"))
-    })
 }
 
 /// Returns the default folder for the pictures of the scene `file`.

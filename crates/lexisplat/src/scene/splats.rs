@@ -103,6 +103,19 @@ pub(crate) fn all_finite<'a>(arrays: impl IntoIterator<Item = (&'static str, &'a
 }
 
 impl Geometry {
+    /// Appends the Gaussians of `other`, which has the same extras, and normals if this one has any.
+    pub(crate) fn append(&mut self, other: Self) {
+        self.positions.extend(other.positions);
+        self.normals.extend(other.normals);
+        self.dc.extend(other.dc);
+        self.opacities.extend(other.opacities);
+        self.scales.extend(other.scales);
+        self.rotations.extend(other.rotations);
+        for (to, from) in self.extras.iter_mut().zip(other.extras) {
+            to.values.append(from.values);
+        }
+    }
+
     /// `n` Gaussians of zeros, without normals and extras.
     pub(crate) fn zeros(n: usize) -> Self {
         Self {
@@ -240,16 +253,7 @@ impl Splats {
 
     /// Appends the Gaussians of `other`, which has the same degree, the same extras, and normals if this one has any.
     pub fn append(&mut self, other: Self) {
-        let (to, from) = (&mut self.geometry, other.geometry);
-        to.positions.extend(from.positions);
-        to.normals.extend(from.normals);
-        to.dc.extend(from.dc);
-        to.opacities.extend(from.opacities);
-        to.scales.extend(from.scales);
-        to.rotations.extend(from.rotations);
-        for (to, from) in to.extras.iter_mut().zip(from.extras) {
-            to.values.append(from.values);
-        }
+        self.geometry.append(other.geometry);
         self.sh_rest.extend(other.sh_rest);
     }
 

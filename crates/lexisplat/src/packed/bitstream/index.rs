@@ -6,7 +6,7 @@ use super::chunk::LayerForm;
 use super::levels::MAX_LEVELS;
 
 /// Most layers of a file.
-const MAX_LAYERS: usize = 8;
+pub(in crate::packed) const MAX_LAYERS: usize = 8;
 /// Number of bits of the number of layers.
 const LAYERS_BITS: u32 = 7;
 /// Most Gaussians of a chunk. A decoder needs memory for all of them.

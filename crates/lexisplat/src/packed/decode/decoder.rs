@@ -72,11 +72,6 @@ impl Decoder {
         self.decoder.index()
     }
 
-    /// Returns the chunks of the next layer around chunk `c`. While one of them is missing, chunk `c` has interim changes.
-    pub(crate) fn around(&self, c: usize) -> Range<usize> {
-        self.index().around(c)
-    }
-
     /// Returns the Gaussians of each available chunk.
     pub(crate) fn spans(&self) -> &[Range<usize>] {
         &self.spans

@@ -49,6 +49,15 @@ pub struct ChunkOutline {
     pub next: Range<usize>,
 }
 
+impl ChunkOutline {
+    /// Returns the square of the distance from `point` to the bounds; 0 within.
+    pub(crate) fn square_distance(&self, point: [f32; 3]) -> f32 {
+        let [least, most] = self.bounds;
+        let off = |k: usize| (least[k] - point[k]).max(point[k] - most[k]).max(0.0);
+        (0..3).map(|k| off(k) * off(k)).sum()
+    }
+}
+
 /// A range: bytes of a chunk that are fetched, verified and decoded together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]

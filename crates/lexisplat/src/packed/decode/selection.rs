@@ -9,11 +9,9 @@ use crate::support::order::order;
 const BESIDE: f32 = 1.0 / 32.0;
 /// Factor on the need for the ranges of a chunk that are not needed at once: refinements, and SH-rest of smaller values.
 const FINE: f32 = 0.25;
-
 /// Share of the radius of a chunk's bounds that counts as a distance to it, beside the distance to the bounds: its Gaussians
 /// are spread within, and few of them lie at the nearest point.
 const SPREAD: f32 = 0.15;
-
 /// Number of points along each axis of a chunk's bounds by which the share of the chunk in the cone of view is estimated.
 const POINTS: usize = 4;
 
@@ -67,8 +65,7 @@ impl Outline {
         };
         let mut of_chunk = vec![[Vec::new(), Vec::new()]; self.chunks.len()];
         for (r, range) in self.ranges.iter().enumerate().filter(|(_, range)| wanted(range.kind)) {
-            let is_fine =
-                matches!(range.kind, RangeKind::Refinement(_)) || matches!(range.kind, RangeKind::Sh(1..));
+            let is_fine = matches!(range.kind, RangeKind::Refinement(_) | RangeKind::Sh(1..));
             if let Some(ranges) = of_chunk.get_mut(range.chunk) {
                 ranges[usize::from(is_fine)].push(r);
             }
@@ -95,7 +92,9 @@ impl Outline {
             selection.ranges.extend(ranges);
             if !step.is_fine {
                 selection.chunks.push(c);
-                is_chosen.iter_mut().skip(c).take(1).for_each(|chosen| *chosen = true);
+                if let Some(chosen) = is_chosen.get_mut(c) {
+                    *chosen = true;
+                }
                 let next = missing.get_mut(chunk.next.clone()).unwrap_or_default();
                 next.iter_mut().for_each(|missing| *missing -= 1);
             }
@@ -134,14 +133,16 @@ impl Outline {
             let weight = share.sqrt().max(BESIDE);
             // Bounds in files are any numbers, and of some there is no angle.
             let own = if angle < eye.pixel { UNWANTED } else { (weight * angle).max(0.0) };
-            // What lies around it in the next layer cannot come without it.
+            // The chunks of the next layer around it cannot come without it.
             let next = needs.get(chunk.next.clone()).unwrap_or_default();
             let need = next.iter().copied().fold(own, f32::max);
             let need = if chunk.layer == 0 { f32::INFINITY } else { need };
             if need == UNWANTED {
                 continue;
             }
-            needs.iter_mut().skip(c).take(1).for_each(|of_chunk| *of_chunk = need);
+            if let Some(of_chunk) = needs.get_mut(c) {
+                *of_chunk = need;
+            }
             let distance = distance / weight;
             let step = Step { chunk: c, layer: chunk.layer, is_fine: false, need, distance };
             // The Gaussians of the chunk itself are closer to each other.
@@ -163,10 +164,8 @@ struct Sight {
 fn sight(chunk: &ChunkOutline, eye: &Eye) -> Sight {
     let [least, most] = chunk.bounds;
     let square = |v: [f32; 3]| v.iter().map(|x| x * x).sum::<f32>();
-    let outside =
-        std::array::from_fn(|k| (least[k] - eye.position[k]).max(eye.position[k] - most[k]).max(0.0));
     let radius = 0.5 * square(std::array::from_fn(|k| most[k] - least[k])).sqrt();
-    let distance = (square(outside) + (SPREAD * radius).powi(2)).sqrt();
+    let distance = (chunk.square_distance(eye.position) + (SPREAD * radius).powi(2)).sqrt();
     let Some(forward) = eye.forward else { return Sight { distance, share: 1.0 } };
     let limit = libm::cosf(eye.half_angle.clamp(0.0, std::f32::consts::PI)) * square(forward).sqrt();
     let is_inside = |point: &usize| {
@@ -283,6 +282,24 @@ mod tests {
         // What does not fit is left out, and smaller steps follow.
         let tight = select(&eye, &Budget::default().with_bytes(1210_u64));
         assert_eq!((tight.chunks, tight.bytes), (vec![0], 1210));
+    }
+
+    #[test]
+    fn a_scene_in_other_units_is_seen_alike() {
+        let budget = Budget::default().with_splats(1000_u64);
+        let look = |unit: f32| {
+            let mut outline = outline();
+            outline
+                .chunks
+                .iter_mut()
+                .for_each(|chunk| chunk.bounds = chunk.bounds.map(|x| x.map(|x| unit * x)));
+            let eye = Eye::at([unit * 80.0, unit * 5.0, unit * 5.0]).with_half_angle(0.5).with_pixel(0.01);
+            outline.select(&eye.with_forward([1.0, 0.0, 0.0]), &budget, &|_| true)
+        };
+        // Powers of two leave all roundings as they are.
+        for unit in [1.0 / 1024.0, 4096.0] {
+            assert_eq!(look(unit), look(1.0));
+        }
     }
 
     /// Bounds in a file may be any finite numbers.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::options::PackOptions;
+use crate::packed::bitstream::index::MAX_LAYERS;
 use crate::packed::bitstream::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
 /// Least number of Gaussians of a scene with two layers, by default. Smaller scenes have small files.
@@ -11,8 +12,6 @@ pub(in crate::packed) const LEAST_LAYERED: usize = 8000;
 const COARSE_SHARE: f64 = 0.14;
 /// Share of the Gaussians of a first layer that stay in it when it is divided in two, for levels of detail.
 const DIVIDED_SHARE: f64 = 0.2;
-/// Most layers. A reader takes eight.
-const MOST_LAYERS: usize = 8;
 /// Power of the energy to which the probability of a layer is proportional. The energy of a Gaussian is the squared change
 /// of pictures without it. With a power of 1 the Gaussians that show most would stand alone, with holes between them
 /// (docs/METHOD.md, "Layers").
@@ -236,7 +235,7 @@ fn shares(gaussians: usize, most: Option<usize>) -> Vec<f64> {
     let mut first = COARSE_SHARE;
     let mut others = Vec::new();
     let is_above = |first: f64| most.is_some_and(|most| first * gaussians as f64 > most as f64);
-    while is_above(first) && others.len() + 2 < MOST_LAYERS {
+    while is_above(first) && others.len() + 2 < MAX_LAYERS {
         others.insert(0, (1.0 - DIVIDED_SHARE) * first);
         first *= DIVIDED_SHARE;
     }

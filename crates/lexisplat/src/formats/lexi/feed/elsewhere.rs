@@ -70,7 +70,7 @@ impl LexiFeed {
     /// as the file says to fill their place. None if the file does not say.
     #[must_use]
     pub fn around(&self, chunk: usize) -> Range<usize> {
-        self.ranges.as_deref().map_or(0..0, |ranges| ranges.decoder.around(chunk))
+        self.outline().and_then(|outline| outline.chunks.get(chunk)).map_or(0..0, |chunk| chunk.next.clone())
     }
 
     /// How many ranges of chunk `chunk` are held whole.

@@ -191,7 +191,9 @@ impl Ranges {
     pub(super) fn hold(&mut self, chosen: &[usize]) {
         let mut is_chosen = vec![false; self.states.len()];
         for &r in chosen {
-            is_chosen.iter_mut().skip(r).take(1).for_each(|chosen| *chosen = true);
+            if let Some(chosen) = is_chosen.get_mut(r) {
+                *chosen = true;
+            }
         }
         for (state, is_chosen) in self.states.iter_mut().zip(is_chosen) {
             match (&*state, is_chosen) {
@@ -288,12 +290,7 @@ fn is_near(outline: &Outline, c: usize, options: &FeedOptions) -> bool {
 fn order(outline: &Outline, options: &FeedOptions) -> Vec<usize> {
     let count = outline.ranges.len();
     let Some(point) = options.nearest else { return (0..count).collect() };
-    let squares = outline.chunks.iter().map(|chunk| {
-        let [least, most] = chunk.bounds;
-        let off = |k: usize| (least[k] - point[k]).max(point[k] - most[k]).max(0.0);
-        (0..3).map(|k| off(k) * off(k)).sum::<f32>()
-    });
-    let squares: Vec<f32> = squares.collect();
+    let squares: Vec<f32> = outline.chunks.iter().map(|chunk| chunk.square_distance(point)).collect();
     // Layers and kinds follow one another as they first do in the file.
     let mut phases: Vec<(usize, RangeKind)> = Vec::new();
     let mut keys = Vec::with_capacity(count);

@@ -32,7 +32,7 @@ use crate::support::error::Result;
 ///     let eye = Eye::at([x, 0.0, -3.0]).with_forward([0.0, 0.0, 1.0]);
 ///     while let Some(range) = scene.wants(&eye, &Budget::default().with_splats(500_u64)) {
 ///         scene.feed(range.start, get(range))?; // from a disk or by HTTP
-///         // What came so far may be drawn now.
+///         // The ranges that came so far may be drawn now.
 ///     }
 ///     scene.refresh()?;
 ///     let splats = scene.chunks().map(|(_, model)| model.len()).sum::<usize>();
@@ -44,6 +44,8 @@ use crate::support::error::Result;
 pub struct StreamedScene {
     feed: LexiFeed,
     chunks: BTreeMap<usize, Held>,
+    /// The view and the budget of the last look at the outline.
+    looked: Option<(Eye, Budget)>,
 }
 
 /// A decoded chunk.
@@ -53,7 +55,7 @@ struct Held {
     model: Model,
 }
 
-/// What a chunk is decoded from.
+/// The bases and ranges that a chunk is decoded from.
 #[derive(Debug, PartialEq, Eq)]
 struct Arrived {
     /// Number of its ranges that came.
@@ -66,7 +68,7 @@ impl StreamedScene {
     /// Creates a scene of which nothing is in memory. `feed` takes its file.
     #[must_use]
     pub fn new(feed: LexiFeed) -> Self {
-        Self { feed, chunks: BTreeMap::new() }
+        Self { feed, chunks: BTreeMap::new(), looked: None }
     }
 
     /// Returns the feed that takes the file.
@@ -78,13 +80,16 @@ impl StreamedScene {
     /// Returns the bytes of the file to fetch next, so that the scene shows what `eye` sees within `budget`; `None` if all
     /// came. This is the start of the file first, then as after [`Self::look`].
     pub fn wants(&mut self, eye: &Eye, budget: &Budget) -> Option<std::ops::Range<u64>> {
-        self.look(eye, budget);
+        if self.looked != Some((*eye, *budget)) {
+            self.look(eye, budget);
+        }
         self.feed.wants()
     }
 
     /// Chooses what `eye` sees within `budget`, drops all else, and asks for what is missing ([`LexiFeed::look`]).
     pub fn look(&mut self, eye: &Eye, budget: &Budget) -> Option<Selection> {
         let selection = self.feed.look(eye, budget)?;
+        self.looked = Some((*eye, *budget));
         let mut chosen = selection.chunks.clone();
         chosen.sort_unstable();
         self.chunks.retain(|c, _| chosen.binary_search(c).is_ok());
@@ -138,13 +143,9 @@ impl StreamedScene {
         let (mut counts, mut indices) = (Vec::new(), Indices::for_atoms(dictionary.len()));
         let (mut values, mut escapes) = (Vec::<f16>::new(), Escapes::default());
         for model in models {
-            let (g, codes) = (model.geometry(), model.codes());
-            let before = u32::try_from(geometry.positions.len()).unwrap_or(u32::MAX);
-            geometry.positions.extend(&g.positions);
-            geometry.dc.extend(&g.dc);
-            geometry.opacities.extend(&g.opacities);
-            geometry.scales.extend(&g.scales);
-            geometry.rotations.extend(&g.rotations);
+            let codes = model.codes();
+            let before = u32::try_from(geometry.len()).unwrap_or(u32::MAX);
+            geometry.append(model.geometry().clone());
             counts.extend(codes.counts());
             match (&mut indices, codes.indices()) {
                 (Indices::U8(all), Indices::U8(own)) => all.extend(own),
