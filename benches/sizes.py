@@ -93,4 +93,5 @@ def size_of(told):
     return found["gaussians"] + found["lexi"]["removed"]
 
 
-main()
+if __name__ == "__main__":
+    main()
