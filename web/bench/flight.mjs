@@ -1,11 +1,12 @@
 // A flight through a large scene within a budget, in headless Chromium.
 //
 //   LEXISPLAT_NPM=node_modules node web/bench/flight.mjs SCENE.lexi CAMERAS.json [--budget 1000000] [--bytes 134217728]
-//       [--width 640] [--height 360] [--whole FOLDER] [--every 10] [--rate BYTES]
+//       [--width 640] [--height 360] [--whole FOLDER] [--every 10] [--rate BYTES] [--blob]
 //
 // It goes from camera to camera, and waits at each until all that was chosen is on the GPU. It prints what was drawn, fetched
 // and held, and the memory of Chromium's processes. With FOLDER, which has pictures of all Gaussians by `render` from the same
-// cameras, each tenth view is drawn and compared. RATE is how many bytes the server sends a second.
+// cameras, each tenth view is drawn and compared. RATE is how many bytes the server sends a second. With --blob
+// the scene is a file in the browser: what drives it keeps up to 200 MB of a server's answers in the page's process.
 
 import { readFileSync, readdirSync } from 'node:fs';
 import { basename, dirname, join, resolve } from 'node:path';
@@ -18,7 +19,7 @@ const web = dirname(dirname(fileURLToPath(import.meta.url)));
 const text = (value) => ({ type: 'string', default: value });
 const { values, positionals } = parseArgs({
   allowPositionals: true,
-  options: { budget: text('1000000'), bytes: text(String(128 * 2 ** 20)), width: text('640'), height: text('360'), whole: { type: 'string' }, every: text('10'), rate: { type: 'string' } },
+  options: { budget: text('1000000'), bytes: text(String(128 * 2 ** 20)), width: text('640'), height: text('360'), whole: { type: 'string' }, every: text('10'), rate: { type: 'string' }, blob: { type: 'boolean', default: false } },
 });
 const [scene, cameras] = positionals.map((path) => resolve(path));
 const [budget, bytes, width, height, every] = ['budget', 'bytes', 'width', 'height', 'every'].map((name) => Number(values[name]));
@@ -34,7 +35,7 @@ await page.waitForFunction(() => document.title === 'ready');
 await page.evaluate(() => window.bench.start());
 await page.evaluate(([w, h]) => window.bench.resize(w, h), [width, height]);
 const began = performance.now();
-await page.evaluate(([url, budget]) => window.bench.begin(url, budget), [`/scene/${basename(scene)}`, { splats: budget, bytes }]);
+await page.evaluate(([url, budget, blob]) => window.bench.begin(url, budget, blob), [`/scene/${basename(scene)}`, { splats: budget, bytes }, values.blob]);
 console.log(`${basename(scene)}: first layer after ${Math.round(performance.now() - began)} ms, ${fetched()} bytes`);
 await page.evaluate((url) => window.bench.cameras(url), `/cameras/${basename(cameras)}`);
 
@@ -64,6 +65,7 @@ console.log(`${views.length} views, at most ${whole(most(of('gaussians')))} Gaus
 console.log(`fetched for a view ${whole(mean(of('fetched')))} bytes, at most ${whole(most(of('fetched')))}; held at most ${whole(most(of('held')))}`);
 console.log(`until all of a view is there: ${whole(mean(of('milliseconds')))} ms, at most ${whole(most(of('milliseconds')))}`);
 console.log(`on the GPU at most ${mebibytes(most(of('resident')))}${of('most').length ? `, with buffers for drawing ${mebibytes(most(of('most')))}` : ''}`);
+console.log(`WebAssembly of the page at most ${mebibytes(most(of('wasm')))}, JavaScript's heap ${mebibytes(most(of('js')))}`);
 for (const kind of ['renderer', 'gpu-process']) console.log(`memory of the process '${kind}': at most ${mebibytes(most(views.map((view) => view.memory[kind] ?? 0)))}`);
 const scores = of('psnr');
 if (scores.length) console.log(`PSNR of ${scores.length} views: mean ${mean(scores).toFixed(2)} dB, least ${Math.min(...scores).toFixed(2)}`);

@@ -6,10 +6,11 @@ import { show } from '../src/session.js';
 const canvas = document.getElementById('canvas');
 let viewer;
 let env;
+let heap;
 
 async function start(workers = 2) {
   const module = await WebAssembly.compileStreaming(fetch('../wasm/viewer_bg.wasm'));
-  wasm.initSync({ module });
+  ({ memory: heap } = wasm.initSync({ module }));
   env = { wasm: module, worker: () => new Worker(new URL('../src/viewer-worker.js', import.meta.url), { type: 'module' }), workers };
   viewer = await wasm.Viewer.create(canvas, '{}');
 }
@@ -43,7 +44,7 @@ function act(change) {
 }
 
 /** Begins a scene of which a part is drawn within `budget`. Resolves when some of its first layer is there. */
-async function begin(url, budget) {
+async function begin(url, budget, asBlob = false) {
   let isBegun;
   const begun = new Promise((resolve) => (isBegun = resolve));
   const change = async ({ removed, parts }) => {
@@ -51,7 +52,7 @@ async function begin(url, budget) {
     for (const { index, part } of parts) await viewer.part(0, index, part);
     isBegun();
   };
-  const shown = show(url, {
+  const shown = show(asBlob ? await (await fetch(url)).blob() : url, {
     env,
     budget,
     onForm: (bytes, info) => act(() => viewer.form(0, bytes, JSON.stringify(info))),
@@ -68,7 +69,7 @@ async function fly() {
   await stream.settled();
   const milliseconds = performance.now() - began;
   const report = await act(() => JSON.parse(viewer.report()));
-  return { milliseconds, camera: report.camera, gaussians: report.gaussians[0], resident: report.resident_bytes, ...stream.state };
+  return { milliseconds, camera: report.camera, gaussians: report.gaussians[0], resident: report.resident_bytes, wasm: heap.buffer.byteLength, js: performance.memory?.usedJSHeapSize, ...stream.state };
 }
 
 function resize(width, height) {

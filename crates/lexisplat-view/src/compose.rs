@@ -1,6 +1,6 @@
 //! Draws an arrangement of pictures to memory instead of the screen.
 
-use lexisplat_render::gpu::readback;
+use lexisplat_render::gpu::{OwnedBuffer, readback};
 
 use crate::error::{Error, Result};
 use crate::present::{Composition, Presenter};
@@ -50,7 +50,7 @@ impl Composer {
 
     /// Starts drawing `composition`. Returns the buffer for its rows, each padded to [`ROW`] bytes, and its width and
     /// height in pixels.
-    fn submit(&self, composition: &Composition) -> Result<(wgpu::Buffer, (u32, u32))> {
+    fn submit(&self, composition: &Composition) -> Result<(OwnedBuffer, (u32, u32))> {
         let device = &self.presenter.device;
         let bound = self.presenter.bind(composition);
         let (Some(bound), Some((width, height))) = (bound, composition.size()) else {

@@ -1,7 +1,9 @@
 //! A picture on the graphics device.
 
+use std::sync::Arc;
+
 use lexisplat_render::Image;
-use lexisplat_render::gpu::readback;
+use lexisplat_render::gpu::{OwnedBuffer, readback};
 
 use crate::error::Result;
 
@@ -13,7 +15,7 @@ const PIXEL: u64 = size_of::<[f32; 4]>() as u64;
 pub struct Picture {
     /// Red, green, blue and 1, each as f32, for each of `width * height` pixels, row by row; not clamped. The usage of
     /// the buffer is at least `STORAGE`.
-    pub pixels: wgpu::Buffer,
+    pub pixels: Arc<OwnedBuffer>,
     /// Width in pixels.
     pub width: u32,
     /// Height in pixels.
@@ -41,7 +43,7 @@ impl Picture {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(pixels, 0, &copy, 0, size);
         queue.submit([encoder.finish()]);
-        Self { pixels: copy, width, height }
+        Self { pixels: Arc::new(copy.into()), width, height }
     }
 
     /// Copies the picture to memory. Its buffer must allow `COPY_SRC`. Outside of a browser something must poll the

@@ -13,10 +13,36 @@ const MIN_BUFFER: u64 = 256;
 /// Number of bytes uploaded at once. wgpu holds a copy of each piece until the GPU has read it.
 const UPLOAD_PIECE: usize = 32 << 20;
 
-/// A buffer on the GPU.
+/// A buffer of wgpu whose memory is freed when this value is dropped and submitted work is done. A browser frees the memory of
+/// a plain [`wgpu::Buffer`] only when it collects garbage, which it does not know to be large.
+#[derive(Debug)]
+pub struct OwnedBuffer(wgpu::Buffer);
+
+impl From<wgpu::Buffer> for OwnedBuffer {
+    fn from(buffer: wgpu::Buffer) -> Self {
+        Self(buffer)
+    }
+}
+
+impl std::ops::Deref for OwnedBuffer {
+    type Target = wgpu::Buffer;
+
+    fn deref(&self) -> &wgpu::Buffer {
+        &self.0
+    }
+}
+
+#[cfg(target_family = "wasm")]
+impl Drop for OwnedBuffer {
+    fn drop(&mut self) {
+        self.0.destroy();
+    }
+}
+
+/// A buffer on the GPU, whose bytes are counted.
 #[derive(Debug)]
 pub(super) struct Buffer {
-    pub(super) raw: wgpu::Buffer,
+    pub(super) raw: OwnedBuffer,
     counted: Counted,
 }
 
@@ -39,7 +65,7 @@ impl Gpu {
         }
         let descriptor =
             wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-        Ok(Buffer { raw: self.device().create_buffer(&descriptor), counted: self.count(size) })
+        Ok(Buffer { raw: self.device().create_buffer(&descriptor).into(), counted: self.count(size) })
     }
 
     /// Makes a buffer that kernels read and write. It can be copied from and to.

@@ -53,6 +53,7 @@ mod work;
 
 pub use wgpu;
 
+pub use buffer::OwnedBuffer;
 #[cfg(not(target_family = "wasm"))]
 pub use device::adapters;
 pub use device::{AdapterSummary, Gpu, adapters_async, rank};

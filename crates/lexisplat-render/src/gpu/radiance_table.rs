@@ -30,6 +30,14 @@ pub(super) struct RadianceTable {
     pub(super) bytes: Counted,
 }
 
+/// A browser would free the texels only when it collects garbage.
+#[cfg(target_family = "wasm")]
+impl Drop for RadianceTable {
+    fn drop(&mut self) {
+        self.view.texture().destroy();
+    }
+}
+
 impl RadianceTable {
     /// Computes the table and uploads it.
     pub(super) async fn new(gpu: &Gpu, dictionary: &Dictionary) -> Result<Self> {

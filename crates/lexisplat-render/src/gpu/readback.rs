@@ -5,15 +5,18 @@ use bytemuck::Pod;
 use crate::error::{Error, Result};
 use crate::wait::answer;
 
+use super::buffer::OwnedBuffer;
+
 /// Returns a buffer of `size` bytes. The GPU copies to it, and [`read_async`] reads it.
 #[must_use]
-pub fn target(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor {
+pub fn target(device: &wgpu::Device, size: u64) -> OwnedBuffer {
+    let target = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("readback"),
         size,
         usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
         mapped_at_creation: false,
-    })
+    });
+    target.into()
 }
 
 /// Returns the first `size` bytes of `target`, a whole number of `T`, once all submitted work that uses it is

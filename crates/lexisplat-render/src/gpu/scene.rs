@@ -193,6 +193,8 @@ impl GpuScene {
         for cut in &cuts {
             chunks.push(part.upload(&self.gpu, cut).await?);
         }
+        // The device keeps copies of what is uploaded, and buffers that were dropped, until something is submitted.
+        self.gpu.queue().submit([]);
         self.parts.insert(index, Part { chunks, bounds: part.bounds() });
         self.changed();
         Ok(())

@@ -52,7 +52,7 @@ impl SceneRenderer for CpuSceneRenderer {
             usage: wgpu::BufferUsages::STORAGE,
         });
         Ok(DrawnPicture {
-            picture: Picture { pixels, width: image.width, height: image.height },
+            picture: Picture { pixels: Arc::new(pixels.into()), width: image.width, height: image.height },
             gaussians: drawn.gaussians,
             stage_times: drawn.stage_times,
             image: Some(image),
