@@ -25,16 +25,20 @@ export async function openWith(env, source, options) {
   const { signal } = settings;
   signal?.throwIfAborted();
   const workers = settings.workers ?? (env.hasWorkers ? WORKERS : 0);
+  // Workers start while the first bytes come.
+  const starting = Pool.of(workers, env);
+  const stop = () => starting.then((pool) => pool.close()).catch(() => {});
   let pool;
   try {
     const start = await readStart(input.source, signal);
     if (start.version !== PACKED) {
       if (start.version === undefined) throw new Error(`${input.source.name}: this is not a .lexi file`);
+      stop();
       pool = await Pool.of(Math.min(workers, 1), await env.files());
       return await wholeScene({ input, settings, pool, start });
     }
     const header = await startFeed(input, env.wasm, start, settings);
-    pool = await Pool.of(workers, env);
+    pool = await starting;
     await startDecoders(pool, input, settings);
     const dictionary = { atoms: header.atoms, rest: restOf(header.degree), values: input.feed.dictionary() };
     return new Scene({ input, options: settings, header, dictionary, pool });
@@ -42,6 +46,7 @@ export async function openWith(env, source, options) {
     input.source.close();
     input.feed?.free();
     pool?.close();
+    stop();
     throw error;
   }
 }

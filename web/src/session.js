@@ -42,24 +42,23 @@ const UNLIMITED = { splats: Infinity, bytes: Infinity };
  */
 export async function show(source, { env, onProgress, signal, budget = UNLIMITED, memory = Infinity, ...on }) {
   const input = { source: sourceOf(source), feed: undefined };
-  let pool;
   const stats = { milliseconds: 0 };
   const report = (progress) => onProgress?.({ ...progress, ms: stats.milliseconds });
   const options = watched(input.source, { memory: MEMORY, shParts: ALL_PARTS, signal, onProgress: report });
+  let stream;
+  let starting;
   const close = () => {
     input.source.close();
     input.feed?.free();
-    pool?.close();
+    starting?.then((pool) => pool.close()).catch(() => {});
   };
-  let stream;
   try {
     signal?.throwIfAborted();
+    // Workers start while the first bytes come.
+    starting = Pool.of(env.workers, { module: env.wasm, worker: env.worker, handler: () => viewerHandlerOf(wasm) });
+    starting.catch(() => {});
     const start = await readStart(input.source, signal);
-    pool = await Pool.of(start.version === PACKED ? env.workers : Math.min(env.workers, 1), {
-      module: env.wasm,
-      worker: env.worker,
-      handler: () => viewerHandlerOf(wasm),
-    });
+    const pool = await starting;
     const given = { input, start, pool, options, stats, memory, ...on };
     if (start.version !== PACKED) return { info: await whole(given) };
     const header = await startFeed(input, wasm, start, options);

@@ -290,6 +290,6 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
 describe('the module of <lexi-viewer>', () => {
   it('can be loaded where there is no browser', async () => {
     const { LexiViewer } = await import('../src/viewer/element.js');
-    assert.deepEqual(LexiViewer.observedAttributes, ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still']);
+    assert.deepEqual(LexiViewer.observedAttributes, ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still', 'budget', 'budget-bytes']);
   });
 });

@@ -11,6 +11,7 @@ import { join, relative } from 'node:path';
 import { after, mock, test } from 'node:test';
 import { fileURLToPath, pathToFileURL } from 'node:url';
 import { open } from 'lexisplat';
+import { sourceOf } from '../src/source.js';
 
 const golden = fileURLToPath(new URL('../../crates/lexisplat/tests/golden/', import.meta.url));
 const files = readdirSync(golden).filter((file) => file.endsWith('.lexi'));
@@ -171,10 +172,11 @@ async function served(bytes, answer, run) {
 const plain = (_, response, bytes) => response.writeHead(200, { 'content-length': bytes.length }).end(bytes);
 
 function withRanges({ headers }, response, bytes) {
-  const from = Number(/^bytes=(\d+)-/.exec(headers.range ?? '')?.[1] ?? 0);
-  const head = { 'content-length': bytes.length - from, 'accept-ranges': 'bytes' };
-  if (headers.range) head['content-range'] = `bytes ${from}-${bytes.length - 1}/${bytes.length}`;
-  response.writeHead(headers.range ? 206 : 200, head).end(bytes.subarray(from));
+  const [, first = 0, last = ''] = /^bytes=(\d+)-(\d*)/.exec(headers.range ?? '') ?? [];
+  const [from, to] = [Number(first), last === '' ? bytes.length : Math.min(Number(last) + 1, bytes.length)];
+  const head = { 'content-length': to - from, 'accept-ranges': 'bytes' };
+  if (headers.range) head['content-range'] = `bytes ${from}-${to - 1}/${bytes.length}`;
+  response.writeHead(headers.range ? 206 : 200, head).end(bytes.subarray(from, to));
 }
 
 test('files are fetched, with and without ranges', async () => {
@@ -189,6 +191,25 @@ test('files are fetched, with and without ranges', async () => {
       scene.close();
     });
   }
+});
+
+test('ranges are given at the same time, and a server without them is told', async () => {
+  const ends = (_, response) => response.writeHead(206, { 'content-range': `bytes 0-9/${layered.length}` }).end(layered.subarray(0, 4));
+  const places = [[100, 300], [0, 1], [layered.length - 5, layered.length], [200, 40_000]];
+  const check = async (source) => {
+    assert.ok(await source.hasRanges());
+    const ranges = await Promise.all(places.map(([from, to]) => source.range(from, to)));
+    ranges.forEach((bytes, k) => assert.deepEqual(Buffer.from(bytes), layered.subarray(...places[k])));
+    await assert.rejects(source.range(layered.length - 1, layered.length + 1), /scene|f\.lexi/);
+  };
+  await check(sourceOf(layered));
+  await check(sourceOf(new Blob([layered])));
+  await served(layered, withRanges, (url) => check(sourceOf(url)));
+  await served(layered, plain, async (url) => {
+    assert.equal(await sourceOf(url).hasRanges(), false);
+    await assert.rejects(sourceOf(url).range(0, 10), /no ranges/);
+  });
+  await served(layered, ends, (url) => assert.rejects(sourceOf(url).range(0, 10), /4 bytes came of those from 0 to 10/));
 });
 
 test('SH that is not asked for is not decoded', async () => {
