@@ -10,7 +10,7 @@ use wasm_bindgen::prelude::*;
 use crate::{Feed, job, thrown};
 
 /// Largest number of bytes of a request, unless a single range has more. A view that moves on waits for requests under way.
-const LONGEST_RUN: u64 = 512 << 10;
+const LONGEST_RUN: u64 = 256 << 10;
 
 /// Takes the ranges of a packed file that a view needs, and tells which chunks to draw. It decodes nothing itself.
 #[wasm_bindgen]
@@ -64,17 +64,10 @@ impl Stream {
     /// each run the first byte and the byte after the last.
     #[expect(clippy::cast_precision_loss, reason = "files are far below 2^53 bytes")]
     pub fn wants(&mut self, most: usize) -> Vec<f64> {
-        let runs = self.feed.wanted_runs(most, LONGEST_RUN);
-        let is_new = |run: &Range<u64>, asked: &[Range<u64>]| {
-            asked.iter().all(|asked| asked.end <= run.start || run.end <= asked.start)
-        };
-        let mut out = Vec::new();
-        for run in runs {
-            if self.asked.len() < most && is_new(&run, &self.asked) {
-                out.extend([run.start as f64, run.end as f64]);
-                self.asked.push(run);
-            }
-        }
+        let free = most.saturating_sub(self.asked.len());
+        let runs = self.feed.wanted_runs(&self.asked, free, LONGEST_RUN);
+        let out = runs.iter().flat_map(|run| [run.start as f64, run.end as f64]).collect();
+        self.asked.extend(runs);
         out
     }
 

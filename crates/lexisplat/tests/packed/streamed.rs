@@ -1,6 +1,7 @@
 //! Scenes with levels of detail, and what is chosen and held of them within a budget.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use lexisplat::lexi::{DrawnChunks, FeedOptions, LexiFeed, LexiReader, StreamedScene};
@@ -177,9 +178,14 @@ fn steps_of_a_few_chunks_leave_no_hole() {
         let budget = Budget::default().with_splats(random.below(GAUSSIANS) as u64);
         let chosen = whole.look(&any_eye(&mut random), &budget).unwrap();
         loop {
-            let runs = whole.wanted_runs(3, 5000);
-            assert!(runs.len() <= 3 && runs.first() == whole.wanted_runs(1, 5000).first());
-            assert!(runs.is_sorted_by(|a, b| a.end != b.start || b.end - a.start > 5000));
+            let runs = whole.wanted_runs(&[], 3, 5000);
+            assert!(runs.len() <= 3 && runs.is_empty() == whole.wants().is_none());
+            let others = whole.wanted_runs(&runs, 3, 5000);
+            let apart = |a: &Range<u64>, b: &Range<u64>| a.end <= b.start || b.end <= a.start;
+            assert!(others.iter().all(|other| runs.iter().all(|run| apart(run, other))));
+            if let (Some(run), Some(first)) = (runs.first(), whole.wants()) {
+                assert!(run.start <= first.start && first.start < run.end, "the first run is needed most");
+            }
             for run in &runs {
                 whole.feed(run.start, &file()[place(run.start)..place(run.end)]).unwrap();
             }

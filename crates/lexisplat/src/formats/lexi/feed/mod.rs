@@ -94,15 +94,17 @@ impl LexiFeed {
     pub fn wants(&self) -> Option<Range<u64>> {
         match &self.ranges {
             None => self.start.gap(),
-            Some(ranges) => ranges.runs(self.room(), 1, u64::MAX).pop(),
+            Some(ranges) => ranges.wants(self.room()),
         }
     }
 
-    /// The next runs of ranges to fetch, as [`Self::wants`], so that several can be fetched at the same time: at most `most`
-    /// runs. None has more than `longest` bytes, unless a single range has. There are none before the start of the file came.
+    /// The runs of ranges to fetch next besides those that were `asked` for and did not come yet, so that several can be fetched at
+    /// the same time: at most `most` runs. None has more than `longest` bytes, unless a single range has. Ranges that are near to
+    /// each other are one run, with the bytes between them. There are none before the start of the file came.
     #[must_use]
-    pub fn wanted_runs(&self, most: usize, longest: u64) -> Vec<Range<u64>> {
-        self.ranges.as_ref().map_or_else(Vec::new, |ranges| ranges.runs(self.room(), most, longest))
+    pub fn wanted_runs(&self, asked: &[Range<u64>], most: usize, longest: u64) -> Vec<Range<u64>> {
+        let runs = |ranges: &Ranges| ranges.runs(self.room(), asked, most, longest);
+        self.ranges.as_deref().map_or_else(Vec::new, runs)
     }
 
     /// Bytes that may be held beside those that are.

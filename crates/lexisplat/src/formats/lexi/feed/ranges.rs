@@ -8,6 +8,10 @@ use crate::packed::{AvailableRanges, Decoder, Outline, PackedHead, RangeKind, Ra
 use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
 
+/// Largest number of bytes between two ranges that are asked for with them, because another request takes longer. They are
+/// what a link of 10 Mbit/s brings in 3 ms.
+const SKIPPED: u64 = 4 << 10;
+
 /// What a file is decoded with, and its ranges.
 #[derive(Debug)]
 pub(super) struct Ranges {
@@ -65,32 +69,59 @@ impl Ranges {
         self.outline.ranges.get(r).map(|range| range.bytes.clone()).unwrap_or_default()
     }
 
-    /// Returns the next runs of bytes to ask for, if there is room for `room` bytes: at most `most` runs. Ranges that follow
-    /// one another are one run, unless it would have more than `longest` bytes.
-    pub(super) fn runs(&self, room: u64, most: usize, longest: u64) -> Vec<Range<u64>> {
-        let mut runs: Vec<Range<u64>> = Vec::new();
+    /// Returns the bytes to ask for next, range by range in the order of need, as far as there is room for `room` bytes.
+    fn missing(&self, room: u64) -> impl Iterator<Item = Range<u64>> {
         let mut left = room;
-        for &r in &self.order {
-            let next = match self.states.get(r) {
-                Some(State::Part(part)) => part.gap(),
-                Some(State::Missing) => Some(self.range(r)),
-                _ => None,
-            };
-            let Some(next) = next else { continue };
-            if matches!(self.states.get(r), Some(State::Missing)) {
-                match left.checked_sub(next.end - next.start) {
-                    Some(rest) => left = rest,
-                    None => break,
-                }
+        let gap = move |&r: &usize| match self.states.get(r)? {
+            State::Part(part) => Some(part.gap()),
+            State::Missing => {
+                let range = self.range(r);
+                left = left.checked_sub(range.end - range.start)?;
+                Some(Some(range))
             }
-            let count = runs.len();
+            _ => Some(None),
+        };
+        self.order.iter().map_while(gap).flatten()
+    }
+
+    /// Returns the next run of bytes to ask for, if there is room for `room` bytes.
+    pub(super) fn wants(&self, room: u64) -> Option<Range<u64>> {
+        let mut missing = self.missing(room);
+        let first = missing.next()?;
+        let end =
+            missing.try_fold(first.end, |end, next| if next.start == end { Ok(next.end) } else { Err(end) });
+        Some(first.start..end.unwrap_or_else(|end| end))
+    }
+
+    /// Returns the next runs of bytes to ask for besides `asked`, if there is room for `room` bytes: at most `most` runs of at
+    /// most `longest` bytes, unless a single range has more. They are made of the next `most * longest` bytes in the order of
+    /// need. The run whose first range is needed most is the first.
+    pub(super) fn runs(&self, room: u64, asked: &[Range<u64>], most: usize, longest: u64) -> Vec<Range<u64>> {
+        let is_new = |range: &Range<u64>| {
+            asked.iter().all(|asked| asked.end <= range.start || range.end <= asked.start)
+        };
+        let mut left = longest.saturating_mul(most as u64);
+        let fits = |range: &Range<u64>| {
+            let was_left = left;
+            left = left.saturating_sub(range.end - range.start);
+            was_left > 0
+        };
+        let next = self.missing(room).filter(is_new).take_while(fits);
+        let mut next: Vec<(usize, Range<u64>)> = next.enumerate().collect();
+        next.sort_unstable_by_key(|(_, range)| range.start);
+        let mut runs: Vec<(usize, Range<u64>)> = Vec::new();
+        for (need, range) in next {
             match runs.last_mut() {
-                Some(run) if run.end == next.start && next.end - run.start <= longest => run.end = next.end,
-                _ if count == most => break,
-                _ => runs.push(next),
+                Some((first, run))
+                    if range.start - run.end <= SKIPPED && range.end - run.start <= longest =>
+                {
+                    (*first, run.end) = (need.min(*first), range.end);
+                }
+                _ => runs.push((need, range)),
             }
         }
-        runs
+        runs.sort_unstable_by_key(|(need, _)| *need);
+        runs.into_iter().take(most).map(|(_, run)| run).collect()
     }
 
     /// The ranges of which there is something in these bytes of the file.
