@@ -50,25 +50,25 @@ pub(crate) fn alone(
     let (targets, cameras): (Vec<Image>, Vec<Camera>) = some.map(shrink).unzip();
     // The views are drawn once for the errors and once in each step.
     progress.begin(Stage::Draw, (SOLUTIONS * (1 + STEPS) * cameras.len()) as u64);
-    let parts = &OneStep(progress);
+    let rounds = &OneStep(progress);
     let mut changes = vec![AppearanceChange::default(); splats.len()];
     let make = |splats: &mut Splats, i: usize, change: AppearanceChange| -> AppearanceChange {
         let change = change.rounded();
         change.make(&mut splats.geometry, i);
         change
     };
-    let sizes = nearest::<5>(&splats, &cameras, &targets, parts)?;
+    let sizes = nearest::<5>(&splats, &cameras, &targets, rounds)?;
     for (i, found) in sizes.iter().enumerate() {
         let log_scale = found[4].clamp(-MOST_LOG_SCALE, MOST_LOG_SCALE);
         changes[i] = make(&mut splats, i, AppearanceChange { log_scale, ..Default::default() });
     }
-    let opacities = nearest::<4>(&splats, &cameras, &targets, parts)?;
+    let opacities = nearest::<4>(&splats, &cameras, &targets, rounds)?;
     for (i, found) in opacities.iter().enumerate() {
         let log_opacity = found[3].clamp(-MOST_LOG_OPACITY, MOST_LOG_OPACITY);
         let change = make(&mut splats, i, AppearanceChange { log_opacity, ..Default::default() });
         changes[i].log_opacity = change.log_opacity;
     }
-    let colours = nearest::<3>(&splats, &cameras, &targets, parts)?;
+    let colours = nearest::<3>(&splats, &cameras, &targets, rounds)?;
     for (change, found) in changes.iter_mut().zip(&colours) {
         change.dc = found.map(|v| v / C0);
     }

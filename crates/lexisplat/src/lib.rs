@@ -76,7 +76,7 @@ pub use scene::joined::Joined;
 pub use scene::moved::unite;
 pub use scene::offset::Offset;
 pub use scene::rounding::Rounding;
-pub use scene::sensitivity::Sensitivity;
+pub use scene::sensitivity::{AppearanceSensitivity, Sensitivity};
 pub use scene::sh::ShDegree;
 pub use scene::source::SplatSource;
 pub use scene::splats::{FLAT_SCALE, Geometry, SURE_OPACITY, SceneMeta, Splats, flatten_scales};

@@ -137,7 +137,8 @@ pub(crate) fn encode(
         ..Record::default()
     };
     let tally = std::mem::take(&mut coded.tally);
-    let (record, report) = tally.into_report(record, n, learned, [learn_seconds, clock.seconds()]);
+    let (record, report) = tally.into_report(record, n);
+    let report = CompressReport { learned, learn_seconds, code_seconds: clock.seconds(), ..report };
     Ok(Encoded { dictionary: encoder.dictionary, coded, record, report })
 }
 

@@ -5,7 +5,7 @@ use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
 use crate::packed::tiles::{Assembly, BUCKET, Coded, Coding, Looked, Plan, SHOWN, Sample, Steps, Tables};
 use crate::packed::{PackOptions, PackedHead, Packer, Refit};
-use crate::scene::sensitivity::{Sensitivity, guessed_total};
+use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity, guessed_total};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
@@ -104,7 +104,7 @@ fn whole<E: From<Error>>(
     let quantised = packer.quantise(factor * packer.step_for(decibels), true, progress)?;
     let device = observer.as_ref().and_then(|observer| observer.device());
     let mut refit = observer.map(|observer| {
-        |part: &Splats, model: &Model, weights: &[[f32; 2]]| observer.refit(part, model, weights, &memo)
+        |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| observer.refit(part, model, own, &memo)
     });
     let appearances = quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
     let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
@@ -169,8 +169,8 @@ fn in_buckets<E: From<Error>>(
         let bucket = ordered.bucket(&plan, number, true)?;
         let looked = Looked::from_bytes(&all_looked.read(number)?)?;
         let mut refit = observer.as_mut().map(|observer| {
-            |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
-                observer.refit(part, model, weights, looked.memo())
+            |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| {
+                observer.refit(part, model, own, looked.memo())
             }
         });
         let refit = refit.as_mut().map(|refit| refit as &mut Refit<'_, E>);

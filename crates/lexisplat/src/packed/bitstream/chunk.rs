@@ -3,6 +3,7 @@
 use super::fill_in::interim;
 use super::geometry_syntax::{GeometrySyntax, Group};
 use super::integer_model::Steering;
+use super::levels::Refinements;
 use super::parameters::CHANGES;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest, RestForm};
@@ -42,15 +43,14 @@ pub(in crate::packed) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<I
 
 /// A receiver of the decoded Gaussians of a chunk. It is a trait, since closures are not inlined into vector code.
 pub(in crate::packed) trait Sink {
-    /// Takes Gaussian `number` of each lane in `set`. It has the index `in_block` in its block. `levels` are the number of
-    /// refinements of the chunk, and of those that are missing. Returns the rule that a damaged file breaks.
+    /// Takes Gaussian `number` of each lane in `set`. It has the index `in_block` in its block. Returns the rule that a damaged file breaks.
     fn group(
         &mut self,
         number: usize,
         in_block: usize,
         set: u32,
         group: &Group,
-        levels: [usize; 2],
+        refinements: Refinements,
     ) -> Result<(), Broken>;
 
     /// Takes the SH-rest of a block of Gaussians. The block begins with Gaussian `number` of each lane.
@@ -139,7 +139,9 @@ impl Form {
                 sums[1 + levels + part].rest(&rest, &self.rest, part);
             }
         }
-        let ranges = ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect();
+        let ranges = ranges.into_iter().zip(sums);
+        let ranges =
+            ranges.map(|(symbols, sums)| RecordedRange { symbols, integers: sums.finish() }).collect();
         let cell = coded.first().map_or(0, |gaussian| gaussian.cell);
         let energy = coded.iter().map(|gaussian| f64::from(gaussian.energy)).sum();
         Some(CodedChunk { gaussians: coded.len(), cell, bounds: bounds.0, energy, ranges })
@@ -173,7 +175,7 @@ impl Form {
         let mut finer: Vec<SymbolDecoder<'_>> = all(1..first_part)?;
         let mut parts: Vec<SymbolDecoder<'_>> = all(first_part..first_part + layer.parts)?;
         let mut changed = if layer.interim { decoder(layer.interim_range())? } else { None };
-        let missing = levels - finer.len();
+        let refinements = Refinements { all: levels, missing: levels - finer.len() };
         let steps = gaussians.div_ceil(lanes);
         let mut sums = vec![Sums::default(); if want.sums { layer.ranges() } else { 0 }];
         let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, levels), Rest::default());
@@ -196,7 +198,7 @@ impl Form {
                     sums[layer.interim_range()].interim(set, &group);
                 }
             }
-            sink.group(step, rest.len(), set, &group, [levels, missing]).map_err(in_range(0))?;
+            sink.group(step, rest.len(), set, &group, refinements).map_err(in_range(0))?;
             rest.push(set, group.colour);
             if rest.len() == BLOCK || step + 1 == steps {
                 for (part, range) in parts.iter_mut().enumerate() {
@@ -248,6 +250,14 @@ fn numbered<'d, 'a>(
     std::iter::once((0, base)).chain((1..).zip(finer)).chain(parts).chain(changed)
 }
 
+/// A range whose symbols are recorded.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct RecordedRange {
+    pub(in crate::packed) symbols: SymbolRecorder,
+    /// CRC-32 of the integers that the range decodes to.
+    pub(in crate::packed) integers: u32,
+}
+
 /// A chunk whose symbols are recorded.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct CodedChunk {
@@ -258,8 +268,7 @@ pub(in crate::packed) struct CodedChunk {
     pub(in crate::packed) bounds: [[f32; 3]; 2],
     /// The sum of the energies of its Gaussians: squared changes of pictures without each of them.
     pub(in crate::packed) energy: f64,
-    /// The symbols of each range, and the checksum of its integers.
-    pub(in crate::packed) ranges: Vec<(SymbolRecorder, u32)>,
+    pub(in crate::packed) ranges: Vec<RecordedRange>,
 }
 
 /// Least and largest coordinates of positions.
@@ -268,7 +277,7 @@ struct Extent([[f32; 3]; 2]);
 impl Extent {
     /// Extends to the positions of the lanes in `set`. `None` for values that no decoder accepts.
     fn add(&mut self, set: u32, group: &Group, frame: &Frame, levels: usize) -> Option<()> {
-        let drawn = Drawn::new(frame, group, [levels, 0], &[false; LANES]);
+        let drawn = Drawn::new(frame, group, Refinements { all: levels, missing: 0 }, &[false; LANES]);
         let [least, most] = &mut self.0;
         for l in (0..LANES).filter(|&l| has(set, l)) {
             for (k, position) in drawn.position.iter().enumerate() {
@@ -343,9 +352,9 @@ impl Sums {
                         self.add(l, &[-1]);
                         row.iter().for_each(|v| self.add(l, &[v.to_bits().cast_signed()]));
                     }
-                    Coded::Code(from, count) => {
+                    Coded::Code { first, count } => {
                         self.add(l, &[count as i32]);
-                        for (atom, value) in rest.nonzeros(part, from, count, l) {
+                        for (atom, value) in rest.nonzeros(part, first, count, l) {
                             self.add(l, &[atom.into(), value]);
                         }
                     }

@@ -3,7 +3,7 @@
 use super::fill_in::change;
 use super::geometry_syntax::Group;
 use super::integer_model::VALUE_BITS;
-use super::levels::{dropped, factor};
+use super::levels::{Refinements, dropped, factor};
 use super::parameters::{DC, KINDS, LAST_CLASS, OPACITY, TARGETS};
 use super::values::{logits, numbers, powers, rotations};
 use crate::packed::bitstream::broken::Broken;
@@ -47,10 +47,10 @@ impl Drawn {
     pub(in crate::packed) fn new(
         frame: &Frame,
         group: &Group,
-        [levels, missing]: [usize; 2],
+        Refinements { all, missing }: Refinements,
         alone: &Lanes<bool>,
     ) -> Self {
-        let (coarse, finer) = (factor(levels), factor(missing));
+        let (coarse, finer) = (factor(all), factor(missing));
         let mut values = group.coarse;
         // Scales and opacities have no coarse steps.
         for t in DC..TARGETS {

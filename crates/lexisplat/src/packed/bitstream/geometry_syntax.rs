@@ -11,7 +11,7 @@ use super::values::{MAX_LOG_OPACITY, rotations};
 use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::morton;
-use crate::packed::bitstream::parameters::{CHANGES, DC, LAST_CLASS, OPACITY, TARGETS};
+use crate::packed::bitstream::parameters::{CHANGES, ColourAndShape, DC, LAST_CLASS, OPACITY, TARGETS};
 use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
 use crate::packed::entropy::symbols::Symbols;
 
@@ -113,7 +113,7 @@ impl<'a> GeometrySyntax<'a> {
         } else {
             std::array::from_fn(|k| [p.means.get(k).copied().unwrap_or(0); LANES])
         };
-        let [colour, shape] = classes(s, set, coded, known, &around, self.levels)?;
+        let ColourAndShape { colour, shape } = classes(s, set, coded, known, &around, self.levels)?;
 
         let features_of = |class: &Lanes<u32>| each(|l| (class[l] << FEATURE_BITS).cast_signed());
         let zeros = [0; LANES];
@@ -227,24 +227,25 @@ fn classes<S: Symbols>(
     known: bool,
     around: &[Lanes; AVERAGED],
     levels: usize,
-) -> Result<[Lanes<u32>; 2], Broken> {
+) -> Result<ColourAndShape<Lanes<u32>>, Broken> {
     const LAST: i32 = LAST_CLASS as i32;
-    let level = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
-    let class = |k: usize, l: usize| coded.map_or(0, |coded| u32::from(coded[l].classes[k]));
+    let rounded = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
+    let class =
+        |l: usize| coded.map_or_else(ColourAndShape::default, |coded| coded[l].classes.map(u32::from));
     let none = [0; LANES];
-    let context = if known { each(|l| 1 + level(around[COLOUR][l])) } else { none };
-    let colour = s.symbols(Stream::ColourClass.at(levels), context, set, |l| class(0, l));
+    let context = if known { each(|l| 1 + rounded(around[COLOUR][l])) } else { none };
+    let colour = s.symbols(Stream::ColourClass.at(levels), context, set, |l| class(l).colour);
     let (mut context, mut nearest) = (none, none);
     for l in 0..LANES {
         let own = (colour[l] << FEATURE_BITS).cast_signed();
         let expected = own.wrapping_add(around[SHAPE][l]).clamp(0, LAST << FEATURE_BITS);
         // The context is in half classes, so that it also says on which side of the rounded value the class may lie.
         let below = (expected - ONE / 4) >> FEATURE_BITS << FEATURE_BITS;
-        context[l] = if known { 1 + level(2 * (expected - below)) } else { 0 };
-        nearest[l] = level(expected);
+        context[l] = if known { 1 + rounded(2 * (expected - below)) } else { 0 };
+        nearest[l] = rounded(expected);
     }
     let over = s.signed(Stream::ShapeClass.at(levels), context, set, |l| {
-        class(1, l).wrapping_sub(nearest[l]).cast_signed()
+        class(l).shape.wrapping_sub(nearest[l]).cast_signed()
     });
     let mut shape = none;
     let mut beyond = false;
@@ -252,7 +253,7 @@ fn classes<S: Symbols>(
         shape[l] = nearest[l].wrapping_add(over[l].cast_unsigned());
         beyond |= colour[l] > u32::from(LAST_CLASS) || shape[l] > u32::from(LAST_CLASS);
     }
-    if beyond { Err(Broken("has a class above 15")) } else { Ok([colour, shape]) }
+    if beyond { Err(Broken("has a class above 15")) } else { Ok(ColourAndShape { colour, shape }) }
 }
 
 /// Share of a step by which a difference must exceed the middle between two values to be rounded away from zero. The value

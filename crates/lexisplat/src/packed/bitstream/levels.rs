@@ -7,6 +7,15 @@ pub(in crate::packed) const DROPPED: [u32; MAX_LEVELS + 1] = [0, 2, 3];
 /// Ratio of steps before and after one refinement.
 pub(in crate::packed) const FACTOR: i32 = 3;
 
+/// The refinements of a chunk.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::packed) struct Refinements {
+    /// How many refinements the layer of the chunk has.
+    pub(in crate::packed) all: usize,
+    /// How many of them are missing.
+    pub(in crate::packed) missing: usize,
+}
+
 /// Returns the ratio of coarse steps to the finest ones, if `levels` refinements are missing.
 pub(in crate::packed) fn factor(levels: usize) -> i32 {
     FACTOR.pow(levels as u32)

@@ -40,7 +40,7 @@ pub(in crate::packed) mod values;
 
 pub(in crate::packed) use atoms::{WholeAtoms, axes};
 pub(in crate::packed) use axes::rounded as rounded_axes;
-pub(in crate::packed) use chunk::{CodedChunk, Form, LayerForm, lanes};
+pub(in crate::packed) use chunk::{CodedChunk, Form, LayerForm, RecordedRange, lanes};
 pub(in crate::packed) use head::Head;
 pub(crate) use head::atoms_of_head;
 pub(in crate::packed) use index::{Chunk, Index, Place, Range, layer_forms};

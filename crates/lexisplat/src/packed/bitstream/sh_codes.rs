@@ -85,8 +85,11 @@ pub(in crate::packed) struct Cursor {
 #[derive(Debug)]
 pub(in crate::packed) enum Coded<'r> {
     Exact(&'r [f32]),
-    /// Index of the first nonzero, and number of nonzeros.
-    Code(usize, usize),
+    /// The nonzeros from index `first` on.
+    Code {
+        first: usize,
+        count: usize,
+    },
 }
 
 impl Rest {
@@ -146,9 +149,9 @@ impl Rest {
             cursor.row += form.dim;
             return Coded::Exact(self.rows[l].get(from..cursor.row).unwrap_or_default());
         }
-        let from = cursor.next[part];
+        let first = cursor.next[part];
         cursor.next[part] += count;
-        Coded::Code(from, count)
+        Coded::Code { first, count }
     }
 
     /// Returns `count` nonzeros of lane `l` in part `part`, from index `from` on: pairs of an atom and a value in steps.

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::bytes::{ByteReader, Fields};
 use super::*;
-use crate::packed::bitstream::parameters::Parameters;
+use crate::packed::bitstream::parameters::{ColourAndShape, Parameters};
 use crate::scene::sh::ShDegree;
 
 /// Most Gaussians of a chunk.
@@ -147,7 +147,7 @@ fn head(dim: usize, points: usize, index: Index) -> Head {
     let mut p = Parameters {
         origin: [1.0, -2.0, 3.5],
         cell: 0.25,
-        base: [0.01, 0.002],
+        base: ColourAndShape { colour: 0.01, shape: 0.002 },
         factors: [1.5, 2.5, 0.5, 1.0, 1.1, 1.2],
         dc_mean: [0.1, 0.2, 0.3],
         dc_axes: rounded_axes(&[[1.0, 0.0, 0.0], [0.0, 0.6, 0.8], [0.0, -0.8, 0.6]]),

@@ -194,7 +194,7 @@ fn trace(name: &str, shown: usize) -> String {
                     exact[i] = true;
                     counts.push(0);
                 }
-                Coded::Code(_, count) => counts.push(count),
+                Coded::Code { count, .. } => counts.push(count),
             }
         }
         for (gaussian, steps) in of_part(&steps, &counts, &exact, part, dim) {

@@ -9,6 +9,7 @@ use crate::packed::bitstream::chunk::{Form, InRange, LayerForm, Sink, Want, star
 use crate::packed::bitstream::drawn::{Drawn, Frame};
 use crate::packed::bitstream::geometry_syntax::Group;
 use crate::packed::bitstream::halves::halved;
+use crate::packed::bitstream::levels::Refinements;
 use crate::packed::bitstream::mean_view::{MOST, MeanView, SeenAtoms, seen_row};
 use crate::packed::bitstream::parameters::LAST_CLASS;
 use crate::packed::bitstream::sh_codes::{BLOCK, Coded, Cursor, Nonzero, Rest};
@@ -162,7 +163,7 @@ impl Sink for Out<'_, '_> {
         in_block: usize,
         set: u32,
         group: &Group,
-        levels: [usize; 2],
+        refinements: Refinements,
     ) -> Result<(), Broken> {
         if number == 0 && group.number[0] != self.cell {
             return Err(Broken("begins with another cell than the index says"));
@@ -170,7 +171,7 @@ impl Sink for Out<'_, '_> {
         let is_alone =
             |l: usize| has(set, l) && self.alone.iter().any(|cells| cells.contains(&group.number[l]));
         let alone = if self.alone.is_empty() { [false; LANES] } else { each(is_alone) };
-        let drawn = Drawn::new(&self.with.frame, group, levels, &alone);
+        let drawn = Drawn::new(&self.with.frame, group, refinements, &alone);
         if let Some(position) = self.positions.get_mut(in_block) {
             *position = drawn.position;
         }
@@ -219,8 +220,8 @@ impl Sink for Out<'_, '_> {
                             self.escapes[l].rows.extend_from_slice(row);
                             exact = Some(row);
                         }
-                        Coded::Code(_, 0) => {}
-                        Coded::Code(from, count) => {
+                        Coded::Code { count: 0, .. } => {}
+                        Coded::Code { first: from, count } => {
                             for (atom, value) in rest.nonzeros(part, from, count, l) {
                                 let added = Nonzero { atom, value: halved(value as f32 * step) };
                                 let mut at = nonzeros.len();

@@ -2,7 +2,7 @@
 
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::integer_model::VALUE_BITS;
-use crate::packed::bitstream::parameters::{CHANGES, Parameters};
+use crate::packed::bitstream::parameters::{CHANGES, ColourAndShape, Parameters};
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, columns, cross, dot, log_sigmoid, longest_first};
 
@@ -71,7 +71,7 @@ impl Canonical {
         &self,
         cell: u64,
         centre: [f64; 3],
-        classes: [u8; 2],
+        classes: ColourAndShape<u8>,
         parameters: &Parameters,
         dc_unit: f64,
     ) -> CodedGaussian {

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::packed::bitstream::parameters::ColourAndShape;
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::rans_encoder::SymbolRecorder;
 use crate::packed::entropy::script::tables_of;
@@ -31,12 +32,11 @@ fn target(form: &RestForm) -> impl Strategy<Value = CodedGaussian> + use<> {
     let pairs = prop::collection::vec((0..=last, value), dim);
     let finite = prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO;
     let exact = prop::option::weighted(0.1, prop::collection::vec(finite, dim));
-    let parts = (count, pairs, exact, prop::array::uniform2(0_u8..16));
-    parts.prop_map(|(count, mut code, exact, classes)| {
+    let fields = (count, pairs, exact, 0_u8..16);
+    fields.prop_map(|(count, mut code, exact, colour)| {
         code.truncate(if exact.is_some() { 0 } else { count });
-        let mut target = CodedGaussian::default();
-        (target.classes, target.code, target.exact) = (classes, code, exact.unwrap_or_default());
-        target
+        let classes = ColourAndShape { colour, shape: 0 };
+        CodedGaussian { classes, code, exact: exact.unwrap_or_default(), ..CodedGaussian::default() }
     })
 }
 
@@ -73,7 +73,7 @@ fn code<S: Symbols>(
         rest.clear();
         let block = first..count.min(first + FEW);
         for i in block.clone() {
-            let colours = each(|l| scene[l].get(i).map_or(0, |target| target.classes[0].into()));
+            let colours = each(|l| scene[l].get(i).map_or(0, |target| target.classes.colour.into()));
             rest.push(set(scene, i), colours);
         }
         let of = |l: usize| scene[l].iter().skip(first).take(block.len()).collect();
@@ -126,10 +126,10 @@ proptest! {
                                     let bits = |row: &[f32]| row.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
                                     assert_eq!(bits(row), bits(&target.exact));
                                 }
-                                Coded::Code(from, count) => {
+                                Coded::Code { first, count } => {
                                     assert!(part > 0 || target.exact.is_empty());
                                     let found: Vec<(u16, i32)> =
-                                        rest.nonzeros(part, from, count, l).collect();
+                                        rest.nonzeros(part, first, count, l).collect();
                                     assert_eq!(found, expected, "part {part} of {there}");
                                 }
                             }

@@ -1,7 +1,7 @@
 //! Choice of the number of atoms that a small scene learns, and of their precision.
 
 use super::costs::Costs;
-use super::{Codebook, PRICE, StopRule, first_atoms, learn};
+use super::{Codebook, PRICE, RateAndDistortion, StopRule, first_atoms, learn};
 use crate::packed::bitstream::{WholeAtoms, axes};
 use crate::scene::sh::ShDegree;
 use crate::sparse::learn::unit_axis;
@@ -72,7 +72,7 @@ pub(in crate::packed) fn choose(
         };
         for bits in (fewest..=usual).rev() {
             let atoms = WholeAtoms::new(degree, own, bits, with_axes);
-            let (error, bits) =
+            let RateAndDistortion { bits, error } =
                 Codebook::new(dim, atoms.rows(), costs.clone()).rate_and_distortion(&scaled, classes);
             let error = error * f64::from(step) * f64::from(step);
             if best.is_none() {

@@ -106,7 +106,7 @@ impl<'p> BucketReader<'p> {
 
 impl Bucket {
     /// Returns the cell of each Gaussian, and its number in the bucket.
-    pub(super) fn scene(&self) -> Vec<MortonKey> {
+    pub(super) fn keys(&self) -> Vec<MortonKey> {
         (0..).zip(&self.places).map(|(source, place)| MortonKey { source, ..*place }).collect()
     }
 

@@ -19,8 +19,8 @@ use crate::packed::encode::quantised::{Gaussians, Quantised, Refit};
 use crate::packed::entropy::tables;
 use crate::packed::entropy::tables::Lookup;
 use crate::scene::extra::Extra;
-use crate::scene::splats::Splats;
-use crate::scene::splats::filter;
+use crate::scene::sensitivity::AppearanceSensitivity;
+use crate::scene::splats::{Splats, filter};
 use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
@@ -146,17 +146,20 @@ impl Coding {
         progress: &dyn Progress,
     ) -> Result<(Counts, Coded), E> {
         let splats = &bucket.splats;
-        let (mut weights, stays) = looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
-        let mut scene = bucket.scene();
-        filter(&mut scene, &stays);
-        filter(&mut weights, &stays);
-        let free = self.steps.steps.classes_of(&weights);
-        let classes = self.floor.classes(&free, &splats.geometry, &scene);
-        let gaussians = Gaussians { scene, classes, weights };
+        let (mut sensitivities, stays) =
+            looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
+        let mut keys = bucket.keys();
+        filter(&mut keys, &stays);
+        filter(&mut sensitivities, &stays);
+        let free = self.steps.steps.classes_of(&sensitivities);
+        let classes = self.floor.classes(&free, &splats.geometry, &keys);
+        let gaussians = Gaussians { keys, classes, sensitivities };
         let options = &plan.options;
         let quantised = Quantised::of_part(splats, options, gaussians, self.encoding(plan)?, progress)?;
         let mut refit = refit.map(|refit| {
-            |part: &Splats, model: &Model, weights: &[[f32; 2]]| refit(part, model, &looked.observed(weights))
+            |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| {
+                refit(part, model, &looked.observed(own))
+            }
         });
         let appearances =
             quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
@@ -235,9 +238,8 @@ impl Coded {
     /// Flips a bit of one byte of the ranges; `at` selects the byte and the bit.
     #[cfg(test)]
     pub(super) fn damage(&mut self, at: usize) {
-        let ranges =
-            self.chunks.iter_mut().flat_map(|chunk| chunk.ranges.iter_mut().map(|range| &mut range.0));
-        let mut bytes: Vec<&mut u8> = ranges.flatten().collect();
+        let ranges = self.chunks.iter_mut().flat_map(|chunk| &mut chunk.ranges);
+        let mut bytes: Vec<&mut u8> = ranges.flat_map(|range| &mut range.bytes).collect();
         let count = bytes.len();
         *bytes[at % count] ^= 1 << (at % 8);
     }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::look::LookStatistics;
 use super::message::messages;
 use super::plan::Plan;
+use crate::packed::bitstream::parameters::ColourAndShape;
 use crate::packed::encode::codebook::StopRule;
 use crate::packed::encode::coder::promise;
 use crate::packed::encode::fit::{self, Classes};
@@ -51,8 +52,11 @@ impl Steps {
                 kept[bucket] = 1;
             }
         }
-        let kinds = [0, 1].map(|kind| Classes::of_histogram(&all.weights[kind]));
-        let steps = fit::Steps::new(&plan.grid, kinds, all.colours.axes(), &all.derivatives);
+        let classes = ColourAndShape {
+            colour: Classes::of_histogram(&all.colour),
+            shape: Classes::of_histogram(&all.opacity),
+        };
+        let steps = fit::Steps::new(&plan.grid, classes, all.colours.axes(), &all.derivatives);
         let mut parameters = steps.with_step(plan.step);
         let stop = promise(&mut parameters, plan.options.tolerance);
         let of_file = kept.iter().sum::<u64>() / plan.files().len().max(1) as u64;
