@@ -159,10 +159,10 @@ pub(in crate::packed) fn axes(degree: ShDegree) -> Vec<f32> {
     let (dim, per_channel) = (degree.rest(), degree.rest_per_channel());
     let mut rows = vec![0.0; dim * dim];
     for (j, row) in rows.chunks_exact_mut(dim.max(1)).enumerate() {
-        for (c, part) in COLOURS[j / per_channel].iter().enumerate() {
+        for (c, weight) in COLOURS[j / per_channel].iter().enumerate() {
             #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
             {
-                row[c * per_channel + j % per_channel] = *part as f32;
+                row[c * per_channel + j % per_channel] = *weight as f32;
             }
         }
     }

@@ -1,9 +1,9 @@
 //! The values that are drawn, from decoded integers.
 
+use super::coarseness::{Refinements, dropped, factor};
 use super::fill_in::change;
 use super::geometry_syntax::Group;
 use super::integer_model::VALUE_BITS;
-use super::levels::{Refinements, dropped, factor};
 use super::parameters::{DC, KINDS, LAST_CLASS, OPACITY, TARGETS};
 use super::values::{logits, numbers, powers, rotations};
 use crate::packed::bitstream::broken::Broken;

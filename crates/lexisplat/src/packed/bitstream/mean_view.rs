@@ -82,7 +82,7 @@ impl MeanView {
             return splats.geometry.dc.clone();
         }
         let per_channel = splats.degree.rest_per_channel();
-        let parts = map_chunks(splats.len(), GAUSSIANS_PER_TASK, |range| {
+        let tasks = map_chunks(splats.len(), GAUSSIANS_PER_TASK, |range| {
             let colour = |i: usize| {
                 let weights = self.weights(splats.degree, splats.geometry.positions[i]);
                 let added = seen_row(splats.rest(i), weights.get(..per_channel).unwrap_or_default());
@@ -90,7 +90,7 @@ impl MeanView {
             };
             range.map(colour).collect::<Vec<Vec3>>()
         });
-        parts.concat()
+        tasks.concat()
     }
 
     /// Stores in `out` the [`Self::weights`] of the positions of all lanes. Entries beyond the coefficients of the degree

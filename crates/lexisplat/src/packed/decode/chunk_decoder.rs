@@ -89,8 +89,7 @@ impl BitstreamDecoder {
         let chunk = index.chunks.get(c).ok_or_else(|| damaged("is not in the index"))?;
         let form = index.layer(chunk.layer);
         let alone = index.alone(chunk.layer, |range| data.came(range.start, range.length));
-        let is_wanted =
-            |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(part) if part >= options.sh_parts);
+        let is_wanted = |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(k) if k >= options.sh_parts);
         let mut ranges = self.checked(data, c, chunk, is_wanted)?;
         if alone.is_empty()
             && !count_bits
@@ -130,7 +129,7 @@ impl BitstreamDecoder {
     }
 
     /// Returns the ranges of a chunk that are there and for which `is_wanted` is true, and verifies their checksums.
-    /// Refinements after a missing refinement are left out, and so are parts of SH-rest after a missing part.
+    /// Refinements after a missing refinement are left out, and so are SH parts after a missing one.
     fn checked<'d>(
         &self,
         data: Data<'d>,

@@ -6,10 +6,10 @@ use half::f16;
 
 use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::chunk::{Form, InRange, LayerForm, Sink, Want, starts};
+use crate::packed::bitstream::coarseness::Refinements;
 use crate::packed::bitstream::drawn::{Drawn, Frame};
 use crate::packed::bitstream::geometry_syntax::Group;
 use crate::packed::bitstream::halves::halved;
-use crate::packed::bitstream::levels::Refinements;
 use crate::packed::bitstream::mean_view::{MOST, MeanView, SeenAtoms, seen_row};
 use crate::packed::bitstream::parameters::LAST_CLASS;
 use crate::packed::bitstream::sh_codes::{BLOCK, Coded, Cursor, Nonzero, Rest};
@@ -122,7 +122,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         // Large values are infinite in f16, and base colours may leave f32 when the sums of codes are subtracted.
         let refused = |range: usize, rule| Err(Refusal::Damaged(InRange { range, broken: Broken(rule) }));
         if !values.iter().fold(true, |good, v| good & v.is_finite()) {
-            return refused(1 + layer.levels, "has an SH value that is infinite in f16");
+            return refused(1 + layer.refinements, "has an SH value that is infinite in f16");
         }
         if !place.dc.as_flattened().iter().fold(true, |good, v| good & v.is_finite()) {
             return refused(0, "has a base colour that is not finite with SH-rest taken away");
@@ -213,8 +213,8 @@ impl Sink for Out<'_, '_> {
                 let step = self.with.frame.value_steps[(colours[l] & u32::from(LAST_CLASS)) as usize];
                 let first = nonzeros.len();
                 let mut exact = None;
-                for part in 0..form.least.len() {
-                    match rest.coded(form, part, k, l, &mut cursors[l]) {
+                for sh_part in 0..form.least.len() {
+                    match rest.coded(form, sh_part, k, l, &mut cursors[l]) {
                         Coded::Exact(row) => {
                             self.escapes[l].gaussians.push(u32::try_from(i).map_err(|_| NO_PLACE)?);
                             self.escapes[l].rows.extend_from_slice(row);
@@ -222,7 +222,7 @@ impl Sink for Out<'_, '_> {
                         }
                         Coded::Code { count: 0, .. } => {}
                         Coded::Code { first: from, count } => {
-                            for (atom, value) in rest.nonzeros(part, from, count, l) {
+                            for (atom, value) in rest.nonzeros(sh_part, from, count, l) {
                                 let added = Nonzero { atom, value: halved(value as f32 * step) };
                                 let mut at = nonzeros.len();
                                 nonzeros.push(added);

@@ -2,12 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::layering::LEAST_LAYERED;
 use crate::scene::splats::all_finite;
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 
+/// Least number of Gaussians of a scene with two layers, by default. Smaller scenes have small files.
+const LEAST_LAYERED: usize = 8000;
 /// Most Gaussians of the first layer, with levels of detail, for [`PackOptions::lod`]. The number was chosen, not
 /// measured: the layer is about half a megabyte.
 pub const LOD_FIRST_LAYER: usize = 65_536;

@@ -13,6 +13,7 @@ pub(in crate::packed) mod lanes;
 pub(in crate::packed) mod log_probabilities;
 pub(in crate::packed) mod rans_decoder;
 pub(in crate::packed) mod rans_encoder;
+pub(in crate::packed) mod rans_state;
 #[cfg(any(test, feature = "fuzzing"))]
 pub(in crate::packed) mod script;
 pub(in crate::packed) mod shifts;

@@ -79,7 +79,7 @@ fn code<S: Symbols>(
         let of = |l: usize| scene[l].iter().skip(first).take(block.len()).collect();
         let wanted: Lanes<Vec<&CodedGaussian>> = std::array::from_fn(of);
         for (part, s) in parts.iter_mut().enumerate() {
-            rest.part(s, encoder.then_some(&wanted), form, part).ok()?;
+            rest.sh_part(s, encoder.then_some(&wanted), form, part).ok()?;
         }
         see(&rest, first);
     }

@@ -64,8 +64,8 @@ impl<'p> BucketReader<'p> {
     /// # Errors
     /// [`Error::Parameter`] if `bytes` are not a piece of this bucket and this scene.
     pub fn add_piece(&mut self, bytes: &[u8]) -> Result<()> {
-        let Piece { scene, bucket, places, rows } = Piece::from_bytes(bytes)?;
-        self.plan.check("piece", [scene], None)?;
+        let Piece { plan_id, bucket, places, rows } = Piece::from_bytes(bytes)?;
+        self.plan.check("piece", [plan_id], None)?;
         if bucket != self.bucket.number {
             return Err(Error::parameter(
                 "piece",

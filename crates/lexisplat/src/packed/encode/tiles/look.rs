@@ -23,7 +23,7 @@ pub(crate) const SHOWN: f64 = 0.1;
 /// the Gaussian stays. It also holds the factor from the observer's sensitivities to these, and the observer's memo.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Looked {
-    scene: u32,
+    plan_id: u32,
     bucket: usize,
     sensitivities: RoundedSensitivities,
     /// One bit for each Gaussian, the lowest first: whether it stays.
@@ -35,7 +35,7 @@ pub struct Looked {
 /// Sums over the Gaussians of a bucket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct LookStatistics {
-    pub(super) scene: u32,
+    pub(super) plan_id: u32,
     pub(super) bucket: usize,
     pub(super) gaussians: u64,
     /// Number of Gaussians that stay.
@@ -84,12 +84,12 @@ impl Bucket {
 
 impl LookStatistics {
     pub(super) fn of(bucket: &Bucket, found: &Sensitivity, plan: &Plan) -> (Self, Looked) {
-        let (scene, splats) = (plan.scene(), &bucket.splats);
+        let splats = &bucket.splats;
         let changes = changes_without(&splats.geometry, found, plan.options.may_change());
         let stays: Vec<bool> = changes.into_iter().map(|c| is_worth_its_bits(c, plan.step)).collect();
-        let looked = Looked::new(scene, bucket.number, &found.appearances(), &stays);
+        let looked = Looked::new(plan.id(), bucket.number, &found.appearances(), &stays);
         let mut out = Self {
-            scene,
+            plan_id: plan.id(),
             bucket: bucket.number,
             gaussians: splats.len() as u64,
             kept: stays.iter().filter(|&&stays| stays).count() as u64,
@@ -124,13 +124,13 @@ impl LookStatistics {
 }
 
 impl Looked {
-    fn new(scene: u32, bucket: usize, sensitivities: &[AppearanceSensitivity], stays: &[bool]) -> Self {
+    fn new(plan_id: u32, bucket: usize, sensitivities: &[AppearanceSensitivity], stays: &[bool]) -> Self {
         let mut bits = vec![0; stays.len().div_ceil(8)];
         for (i, _) in stays.iter().enumerate().filter(|(_, stays)| **stays) {
             bits[i / 8] |= 1_u8 << (i % 8);
         }
         Self {
-            scene,
+            plan_id,
             bucket,
             sensitivities: RoundedSensitivities::of(sensitivities),
             stays: bits,
@@ -169,7 +169,7 @@ impl Looked {
         bucket: &Bucket,
         first_stays: bool,
     ) -> Result<(Vec<AppearanceSensitivity>, Vec<bool>)> {
-        plan.check("looked", [self.scene], None)?;
+        plan.check("looked", [self.plan_id], None)?;
         let count = bucket.splats.len();
         if self.bucket != bucket.number {
             let expected = format!("of bucket {}", bucket.number);

@@ -43,7 +43,7 @@ struct BucketSample {
 /// Sums over the sample of a group, and the rows that a dictionary is learned from.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SampleStatistics {
-    scene: u32,
+    plan_id: u32,
     pub(super) predictors: Predictors,
     /// Most octaves by which the shape of a Gaussian asks for smaller steps than those of class 0.
     pub(super) over: f32,
@@ -99,7 +99,7 @@ impl Sample {
     /// # Errors
     /// [`Error::Parameter`] if `steps` are of another scene.
     pub fn statistics(&self, plan: &Plan, steps: &Steps) -> Result<SampleStatistics> {
-        plan.check("steps", [steps.scene], None)?;
+        plan.check("steps", [steps.plan_id], None)?;
         let mut out = SampleStatistics::none(plan);
         let mean_view = MeanView::new(&plan.options.viewpoints);
         let parameters = &steps.floor.parameters;
@@ -158,7 +158,7 @@ impl BucketSample {
 impl SampleStatistics {
     fn none(plan: &Plan) -> Self {
         Self {
-            scene: plan.scene(),
+            plan_id: plan.id(),
             predictors: Predictors::default(),
             over: 0.0,
             dc: Histogram::default(),
@@ -169,7 +169,7 @@ impl SampleStatistics {
 
     /// Returns the sums and the rows of all groups, which are in order.
     pub(super) fn sum(plan: &Plan, groups: &[Self]) -> Result<Self> {
-        plan.check("sample statistics", groups.iter().map(|group| group.scene), Some(plan.groups()))?;
+        plan.check("sample statistics", groups.iter().map(|group| group.plan_id), Some(plan.groups()))?;
         let mut out = Self::none(plan);
         for group in groups {
             out.predictors.merge(&group.predictors);
