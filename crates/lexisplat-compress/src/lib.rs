@@ -65,7 +65,7 @@ pub use beginning::{Compress, Source, compress};
 pub use decibels::decibels;
 pub use drawing::{DrawOptions, draw_views};
 pub use error::{Error, Result};
-pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
+pub use facts::{ByteCount, RecordReport, attribute_bytes, sh_bytes};
 pub use judge::{Judge, Score};
 pub use layout::choose_layout;
 pub use packing::{Compression, DEFAULT_MEMORY, Packing, Quality};

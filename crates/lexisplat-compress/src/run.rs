@@ -209,7 +209,7 @@ impl Packing {
 
         let clock = Stopwatch::start();
         let writer = LexiWriter::packed(&packed);
-        let tensors = writer.attribute_bytes().to_vec();
+        let tensors = writer.tensor_bytes().to_vec();
         writer.write(sink, progress)?;
         let write_seconds = clock.seconds();
         let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);

@@ -20,7 +20,7 @@ pub(super) struct Document<'a> {
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
     pub(super) accessors: Vec<AccessorEntry>,
-    pub(super) buffer_views: Vec<View>,
+    pub(super) buffer_views: Vec<BufferView>,
     #[serde(borrow)]
     pub(super) buffers: Vec<BufferEntry<'a>>,
 }
@@ -130,7 +130,7 @@ pub(super) enum Shape {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct View {
+pub(super) struct BufferView {
     pub(super) buffer: usize,
     #[serde(default)]
     pub(super) byte_offset: u64,

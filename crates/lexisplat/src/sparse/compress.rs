@@ -217,7 +217,7 @@ impl Encoder {
             progress.advance(range.len() as u64);
             return Ok(());
         };
-        let parts = map_chunks(range.len(), GAUSSIANS_PER_TASK, |piece| {
+        let tasks = map_chunks(range.len(), GAUSSIANS_PER_TASK, |piece| {
             progress.check()?;
             let mut part = Part { tally: Tally::new(dim), ..Part::default() };
             let start = range.start + piece.start;
@@ -227,7 +227,7 @@ impl Encoder {
             progress.advance(piece.len() as u64);
             Ok(part)
         });
-        for part in parts {
+        for part in tasks {
             coded.append(part?);
         }
         Ok(())

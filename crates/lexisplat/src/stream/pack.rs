@@ -25,7 +25,7 @@ pub struct PackedFile {
     pub head: PackedHead,
     /// A report of the packing.
     pub report: CompressReport,
-    /// Number of bytes of each tensor and of the header; see [`LexiWriter::attribute_bytes`].
+    /// Number of bytes of each tensor and of the header; see [`LexiWriter::tensor_bytes`].
     pub tensor_bytes: Vec<(String, u64)>,
 }
 
@@ -110,7 +110,7 @@ fn whole<E: From<Error>>(
     let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
     let packed = packed.with_device(device);
     let writer = LexiWriter::packed(&packed);
-    let tensor_bytes = writer.attribute_bytes().to_vec();
+    let tensor_bytes = writer.tensor_bytes().to_vec();
     writer.write(sink, progress)?;
     Ok(PackedFile { head: packed.head().clone(), report, tensor_bytes })
 }

@@ -30,12 +30,12 @@ pub(super) struct Checked<'a> {
     pub(super) file_bytes: u64,
 }
 
-/// The part of a file that must be there.
+/// The bytes of a file that must be there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Extent {
     /// All bytes of the file.
     Whole,
-    /// A first part of the file, which must be packed.
+    /// A first part of the file, without its last bytes. The file must be packed.
     First,
 }
 
@@ -126,7 +126,7 @@ impl<'a> Checked<'a> {
     }
 
     fn verify_tensors(&self) -> Result<()> {
-        // The ranges of packed data have checksums of their own, so that a part of the data can be checked.
+        // The ranges of packed data have checksums of their own, so each range can be checked alone.
         let (packed, elsewhere): (bool, &[&str]) = match self.is_packed() && self.has(tensor::HEAD) {
             true => (true, &[tensor::HEAD, tensor::DATA]),
             false => (false, &[tensor::HEADER_CHECKSUM]),
@@ -146,7 +146,7 @@ impl<'a> Checked<'a> {
             };
             return Err(self.malformed(format!("metadata 'checksums' names '{name}', {why}")));
         }
-        // Of a first part too, the sums of all tensors must be listed.
+        // The sums of all tensors must be listed, also in a first part of a file.
         let listed = |name: &str| sums.get(name).and_then(Json::text).unwrap_or_default();
         if let Some(name) = names.iter().find(|name| !is_sum(listed(name))) {
             let text =
@@ -156,7 +156,7 @@ impl<'a> Checked<'a> {
         names.retain(|name| self.is_there(name));
         let found = map_chunks(names.len(), 1, |range| {
             let name = names[range.start];
-            self.view(name).map(|t| format!("{:08x}", crc32::hash(t.data)))
+            self.tensor(name).map(|t| format!("{:08x}", crc32::hash(t.data)))
         });
         for (name, sum) in names.iter().zip(found) {
             if sum.ok().as_deref() != Some(listed(name)) {
@@ -269,7 +269,7 @@ impl<'a> Checked<'a> {
         (*self.bytes).as_ref()
     }
 
-    pub(super) fn view(&self, name: &str) -> Result<TensorView<'_>> {
+    pub(super) fn tensor(&self, name: &str) -> Result<StoredTensor<'_>> {
         let missing = || self.malformed(format!("tensor '{name}' is missing"));
         let TensorInfo { dtype, shape, data_offsets: (start, end) } =
             self.header.info(name).ok_or_else(missing)?;
@@ -278,7 +278,7 @@ impl<'a> Checked<'a> {
             let (what, found) = (format!("tensor '{name}'"), self.bytes().len() as u64);
             Error::format(&self.file, FormatError::Truncated { what, expected: end as u64, found })
         })?;
-        Ok(TensorView { dtype: *dtype, shape, data })
+        Ok(StoredTensor { dtype: *dtype, shape, data })
     }
 
     /// Refuses the tensor `name` unless it is a list of bytes. The header alone says so, so the bytes need not be there.
@@ -292,7 +292,7 @@ impl<'a> Checked<'a> {
 
     /// Returns the length of the tensor `name`, which must have one dimension.
     pub(super) fn list_len(&self, name: &str) -> Result<usize> {
-        match self.view(name)?.shape {
+        match self.tensor(name)?.shape {
             [len] => Ok(*len),
             shape => Err(self.malformed(format!("tensor '{name}' has shape {shape:?}"))),
         }
@@ -311,13 +311,15 @@ impl<'a> Checked<'a> {
 
     /// Returns the bytes of the tensor `name`, which must have this type and shape.
     pub(super) fn data(&self, name: &str, dtype: Dtype, shape: &[usize]) -> Result<&[u8]> {
-        let view = self.view(name)?;
-        if view.dtype != dtype || view.shape != shape {
-            let text =
-                format!("tensor '{name}' is {:?} {:?}, expected {dtype:?} {shape:?}", view.dtype, view.shape);
+        let found = self.tensor(name)?;
+        if found.dtype != dtype || found.shape != shape {
+            let text = format!(
+                "tensor '{name}' is {:?} {:?}, expected {dtype:?} {shape:?}",
+                found.dtype, found.shape
+            );
             return Err(self.malformed(text));
         }
-        Ok(view.data)
+        Ok(found.data)
     }
 
     /// Returns a copy of the tensor `name`, which must have this type and shape.
@@ -331,7 +333,7 @@ impl<'a> Checked<'a> {
     }
 
     /// Returns a copy of rows `range` of the tensor `name`, which must have this type and shape.
-    pub(super) fn part<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+    pub(super) fn rows<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
         &self,
         name: &str,
         dtype: Dtype,
@@ -383,7 +385,7 @@ fn read_header(file: &str, bytes: &[u8]) -> Result<Header> {
 
 /// One tensor of a file.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TensorView<'a> {
+pub(super) struct StoredTensor<'a> {
     pub(super) dtype: Dtype,
     pub(super) shape: &'a [usize],
     pub(super) data: &'a [u8],

@@ -9,8 +9,8 @@ use super::chunk::Form;
 use super::fill_in::MOST_STEP;
 use super::index::Index;
 use super::integer_model::{Integers, Steering, Step, VALUE_BITS};
-use super::mean_view::{MeanView, SOFTENINGS};
 use super::parameters::KINDS;
+use super::points_of_view::{PointsOfView, SOFTENINGS};
 use super::sh_codes::RestForm;
 use super::streams::SH_PARTS;
 use crate::packed::bitstream::drawn::Frame;
@@ -43,7 +43,7 @@ pub(in crate::packed) struct Head {
     pub(in crate::packed) rest: RestForm,
     /// Steps of the interim changes of scales, opacities and base colours; `None` without interim changes.
     pub(in crate::packed) interim: Option<[u32; KINDS]>,
-    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) points_of_view: PointsOfView,
     pub(in crate::packed) integers: Integers,
     /// The turn that makes the axes of base colours.
     pub(in crate::packed) dc_turn: [i16; 4],
@@ -68,7 +68,7 @@ impl Head {
         most_dc: f64,
         rest: RestForm,
         atoms: &WholeAtoms,
-        mean_view: MeanView,
+        points_of_view: PointsOfView,
     ) -> Self {
         let mut dc_exponent = 0;
         while most_dc > MOST_DC * f64::from(dc_exponent).exp2() && dc_exponent < MAX_DC_EXPONENT {
@@ -79,7 +79,7 @@ impl Head {
             dictionary: atoms.write(),
             dc_exponent,
             rest,
-            mean_view,
+            points_of_view,
             dc_turn: turn_of(&p.dc_axes),
             frame: Frame {
                 origin: p.origin,
@@ -132,7 +132,7 @@ impl Head {
     pub(in crate::packed) fn write(&self) -> Vec<u8> {
         let mut out = Vec::new();
         put_number(&mut out, self.rest.atoms as u64);
-        let (points, sh_parts) = (&self.mean_view.points, &self.rest.least);
+        let (points, sh_parts) = (&self.points_of_view.points, &self.rest.least);
         let is_promised = self.promised > 0.0;
         let marks = u8::from(is_promised) | u8::from(self.with_axes) << 1;
         out.push(points.len() as u8 | (sh_parts.len() as u8) << POINTS_BITS | marks << MARKS);
@@ -146,7 +146,7 @@ impl Head {
             [&f.origin[..], &[f.cell, step], &f.dc_mean].concat().iter().flat_map(|x| x.to_le_bytes()),
         );
         out.extend(self.dc_turn.iter().flat_map(|x| x.to_le_bytes()));
-        let softening = (!points.is_empty()).then_some(&self.mean_view.softening);
+        let softening = (!points.is_empty()).then_some(&self.points_of_view.softening);
         out.extend(softening.into_iter().flat_map(|x| x.to_le_bytes()));
         points.as_flattened().iter().for_each(|&x| put_f24(&mut out, x));
         for step in self.integers.steps {
@@ -216,15 +216,15 @@ impl Head {
         let dc_mean = from.take("dc_mean", ByteReader::f32s)?;
         let dc_turn: [i16; 4] = from.take("dc_turn", ByteReader::i16s)?;
         let dc_axes = axes_of(dc_turn).ok_or_else(|| BrokenHead("'dc_turn' is 0".to_owned()))?;
-        let mut mean_view = MeanView::default();
+        let mut points_of_view = PointsOfView::default();
         if points > 0 {
-            mean_view.softening = from.take("softening", ByteReader::f32)?;
-            must(SOFTENINGS.contains(&mean_view.softening), || {
+            points_of_view.softening = from.take("softening", ByteReader::f32)?;
+            must(SOFTENINGS.contains(&points_of_view.softening), || {
                 "'softening' is not from 2^-60 to 2^60".to_owned()
             })?;
         }
         for _ in 0..points {
-            mean_view.points.push(from.take("points", ByteReader::f24s)?);
+            points_of_view.points.push(from.take("points", ByteReader::f24s)?);
         }
         let mut integers = Integers::default();
         for step in &mut integers.steps {
@@ -250,7 +250,7 @@ impl Head {
             dc_exponent,
             rest: RestForm { dim, atoms, least },
             interim,
-            mean_view,
+            points_of_view,
             integers,
             dc_turn,
             frame: Frame { origin, cell, dc_mean, dc_axes, ..Frame::default() },

@@ -166,7 +166,7 @@ fn head(dim: usize, points: usize, index: Index) -> Head {
     let points: Vec<[f32; 3]> = (0..points).map(|k| [k as f32, 1.5, -0.25 * k as f32]).collect();
     let degree = (0..=4).filter_map(|l| ShDegree::new(l).ok()).find(|degree| degree.rest() == dim).unwrap();
     let atoms = WholeAtoms::new(degree, &vec![0.5; 300 * dim], 4, false);
-    let mut head = Head::new(&p, 77.0, rest, &atoms, MeanView::new(&points));
+    let mut head = Head::new(&p, 77.0, rest, &atoms, PointsOfView::new(&points));
     if !index.chunks.is_empty() && dim > 0 {
         head = head.with_interim([0.4, 0.5, 0.6]);
     }
@@ -233,12 +233,12 @@ fn heads_with_numbers_no_decoder_takes_are_refused() {
         |h| h.frame.cell = 0.0,
         |h| h.frame.origin[1] = f32::NAN,
         |h| h.value_step = 0.0,
-        |h| h.mean_view.softening = 0.0,
-        |h| h.mean_view.softening = 1e-19,
-        |h| h.mean_view.softening = 1e19,
+        |h| h.points_of_view.softening = 0.0,
+        |h| h.points_of_view.softening = 1e-19,
+        |h| h.points_of_view.softening = 1e19,
         |h| h.dc_turn = [0; 4],
-        |h| h.mean_view.points = vec![[0.0; 3]; 16],
-        |h| h.mean_view.points[7] = [1.0, f32::INFINITY, 0.0],
+        |h| h.points_of_view.points = vec![[0.0; 3]; 16],
+        |h| h.points_of_view.points[7] = [1.0, f32::INFINITY, 0.0],
         |h| h.interim = Some([1, 0, 1]),
         |h| h.interim = Some([1, 1, 1 << 27]),
     ];

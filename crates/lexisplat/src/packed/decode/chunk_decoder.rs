@@ -5,7 +5,7 @@ use crate::packed::bitstream::broken::{Broken, BrokenHead, must};
 use crate::packed::bitstream::chunk::{InRange, Want};
 use crate::packed::bitstream::head::Head;
 use crate::packed::bitstream::index::{Chunk, Index};
-use crate::packed::bitstream::mean_view::SeenAtoms;
+use crate::packed::bitstream::points_of_view::SeenAtoms;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::bitstream::streams::Stream;
 use crate::packed::decode::available_ranges::{Data, DecodeOptions};
@@ -46,10 +46,10 @@ impl BitstreamDecoder {
         let lookup = Lookup::new(&tables);
         let (dictionary, dictionary_bits) = dictionary(&head, packed.degree).map_err(bad)?;
         let unpacker = Unpacker {
-            seen_atoms: SeenAtoms::new(&head.mean_view, &dictionary),
+            seen_atoms: SeenAtoms::new(&head.points_of_view, &dictionary),
             form: head.form(),
             frame: head.frame.clone(),
-            mean_view: head.mean_view.clone(),
+            points_of_view: head.points_of_view.clone(),
             lookup,
             dictionary,
         };

@@ -10,8 +10,8 @@ use crate::packed::bitstream::coarseness::Refinements;
 use crate::packed::bitstream::drawn::{Drawn, Frame};
 use crate::packed::bitstream::geometry_syntax::Group;
 use crate::packed::bitstream::halves::halved;
-use crate::packed::bitstream::mean_view::{MOST, MeanView, SeenAtoms, seen_row};
 use crate::packed::bitstream::parameters::LAST_CLASS;
+use crate::packed::bitstream::points_of_view::{MOST, PointsOfView, SeenAtoms, seen_row};
 use crate::packed::bitstream::sh_codes::{BLOCK, Coded, Cursor, Nonzero, Rest};
 use crate::packed::decode::place::{Piece, Place, indices};
 use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
@@ -26,7 +26,7 @@ use crate::support::simd::Simd;
 pub(in crate::packed) struct Unpacker {
     pub(in crate::packed) form: Form,
     pub(in crate::packed) frame: Frame,
-    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) points_of_view: PointsOfView,
     pub(in crate::packed) lookup: Lookup,
     pub(in crate::packed) dictionary: Dictionary,
     pub(in crate::packed) seen_atoms: SeenAtoms,
@@ -90,7 +90,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         let n = place.counts.len();
         let starts = starts(n, crate::packed::bitstream::chunk::lanes(n));
         let blank = [[0.0; LANES]; 3];
-        let positions = if with.mean_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
+        let positions = if with.points_of_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
         let mut out = Out {
             with,
             place,
@@ -200,9 +200,9 @@ impl Sink for Out<'_, '_> {
         let mut weights = [[0.0; LANES]; MOST];
         for k in 0..rest.len() {
             let (set, colours) = rest.of(k);
-            let has_view = match self.positions.get(k) {
+            let has_points = match self.positions.get(k) {
                 Some(position) => {
-                    self.with.mean_view.lanes(degree, position, &mut weights);
+                    self.with.points_of_view.lanes(degree, position, &mut weights);
                     true
                 }
                 None => false,
@@ -240,7 +240,7 @@ impl Sink for Out<'_, '_> {
                 let count = u8::try_from(code.len())
                     .map_err(|_| Broken("has a Gaussian with more nonzeros than coefficients"))?;
                 *self.place.counts.get_mut(i).ok_or(NO_PLACE)? = count;
-                if !has_view {
+                if !has_points {
                     continue;
                 }
                 let added = match exact {

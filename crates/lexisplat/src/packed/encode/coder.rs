@@ -8,7 +8,7 @@ use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_at
 use super::options::PackOptions;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::parameters::{ColourAndShape, Parameters};
-use crate::packed::bitstream::{MeanView, WholeAtoms, morton, seen_row};
+use crate::packed::bitstream::{PointsOfView, WholeAtoms, morton, seen_row};
 use crate::packed::curve::MortonKey;
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::Splats;
@@ -113,7 +113,7 @@ impl<'a> OrderedGaussians<'a> {
 pub(in crate::packed) struct ChunkCoder {
     pub(in crate::packed) parameters: Parameters,
     pub(in crate::packed) dictionary: Dictionary,
-    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) points_of_view: PointsOfView,
     book: Option<Codebook>,
     stop: StopRule,
     tolerance: Option<f64>,
@@ -124,7 +124,7 @@ impl ChunkCoder {
     pub(in crate::packed) fn new(
         gaussians: OrderedGaussians<'_>,
         mut parameters: Parameters,
-        mean_view: MeanView,
+        points_of_view: PointsOfView,
         options: &PackOptions,
         progress: &dyn Progress,
     ) -> Result<(Self, WholeAtoms)> {
@@ -137,14 +137,14 @@ impl ChunkCoder {
         let learning = Learning { degree: gaussians.splats.degree, total: gaussians.len(), stop, options };
         let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
         parameters.factors[VALUES] *= step;
-        let coder = Self::learned(parameters, mean_view, &atoms, costs, stop, options.tolerance)?;
+        let coder = Self::learned(parameters, points_of_view, &atoms, costs, stop, options.tolerance)?;
         Ok((coder, atoms))
     }
 
     /// Creates a coder of learned `atoms`. `costs` are the costs of symbols.
     pub(in crate::packed) fn learned(
         parameters: Parameters,
-        mean_view: MeanView,
+        points_of_view: PointsOfView,
         atoms: &WholeAtoms,
         costs: Costs,
         stop: StopRule,
@@ -155,7 +155,7 @@ impl ChunkCoder {
         let rows = atoms.rows();
         let book = (dim > 0).then(|| Codebook::new(dim, rows.clone(), costs));
         let dictionary = if dim > 0 { Dictionary::new(degree, rows)? } else { Dictionary::empty() };
-        Ok(Self { parameters, dictionary, mean_view, book, stop, tolerance })
+        Ok(Self { parameters, dictionary, points_of_view, book, stop, tolerance })
     }
 
     /// Returns the codes of `gaussians`; none for scenes without SH-rest.
@@ -204,8 +204,8 @@ impl ChunkCoder {
                     exact = row.to_vec();
                     tally.escapes += 1;
                 }
-                if !self.mean_view.points.is_empty() {
-                    let weights = self.mean_view.weights(dictionary.degree(), form.position);
+                if !self.points_of_view.points.is_empty() {
+                    let weights = self.points_of_view.weights(dictionary.degree(), form.position);
                     let weights = weights.get(..dictionary.degree().rest_per_channel()).unwrap_or_default();
                     shown = seen_row(if exact.is_empty() { &rebuilt } else { &exact }, weights);
                 }

@@ -159,8 +159,8 @@ impl Encoding {
     ) -> Self {
         let mut counts = Counts::of(Tally::new(coder.dictionary.dim()), []);
         let rest = layering.rest(coder.dictionary.dim(), coder.dictionary.len());
-        let mean_view = coder.mean_view.clone();
-        let mut head = Head::new(&coder.parameters, most_dc, rest, &atoms, mean_view);
+        let points_of_view = coder.points_of_view.clone();
+        let mut head = Head::new(&coder.parameters, most_dc, rest, &atoms, points_of_view);
         if layering.layers() > 1 {
             head = head.with_interim(STEPS);
         }

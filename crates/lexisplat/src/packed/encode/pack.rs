@@ -7,7 +7,7 @@ use super::floor::Floor;
 use super::options::PackOptions;
 use super::quantised::{Fitted, Gaussians, Quantised};
 use super::removal::Influence;
-use crate::packed::bitstream::MeanView;
+use crate::packed::bitstream::PointsOfView;
 use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::curve::{Grid, MortonKey};
 use crate::packed::scene::Packed;
@@ -36,7 +36,7 @@ pub struct Packer<S> {
     options: PackOptions,
     keys: Vec<MortonKey>,
     fit: Fit,
-    mean_view: MeanView,
+    points_of_view: PointsOfView,
     /// The base colours that the file holds, by index in `splats`.
     dc: Vec<[f32; 3]>,
     influence: Influence,
@@ -55,11 +55,11 @@ impl<S: Borrow<Splats>> Packer<S> {
         let grid = Grid::fit(&g.positions);
         let mut keys = grid.keys(g);
         keys.sort_unstable();
-        let mean_view = MeanView::new(&options.viewpoints);
-        let dc = mean_view.colours(splats.borrow());
+        let points_of_view = PointsOfView::new(&options.viewpoints);
+        let dc = points_of_view.colours(splats.borrow());
         let fit = Fit::new(g, &dc, sensitivity, &keys, &grid);
         let influence = Influence::new(g, sensitivity, &keys, options.may_change());
-        Ok(Self { splats, options: options.clone(), keys, fit, mean_view, dc, influence })
+        Ok(Self { splats, options: options.clone(), keys, fit, points_of_view, dc, influence })
     }
 
     /// Returns the number of Gaussians.
@@ -118,8 +118,10 @@ impl<S: Borrow<Splats>> Packer<S> {
         };
         let classes = floor.classes(&classes, geometry, &keys);
         let gaussians = Gaussians { keys, classes, sensitivities };
-        let fitted =
-            Fitted { most_dc: most_dc(&floor.parameters, &self.dc), mean_view: self.mean_view.clone() };
+        let fitted = Fitted {
+            most_dc: most_dc(&floor.parameters, &self.dc),
+            points_of_view: self.points_of_view.clone(),
+        };
         Quantised::new(self.splats.borrow(), &self.options, gaussians, floor.parameters, fitted, progress)
     }
 }

@@ -11,7 +11,7 @@ use super::layering::Layering;
 use super::options::PackOptions;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::parameters::{ColourAndShape, Parameters};
-use crate::packed::bitstream::{CodedChunk, MeanView};
+use crate::packed::bitstream::{CodedChunk, PointsOfView};
 use crate::packed::curve::MortonKey;
 use crate::packed::decode::reorder::gather;
 use crate::packed::entropy::tables::Tables;
@@ -66,7 +66,15 @@ impl Gaussians {
 pub(in crate::packed) struct Fitted {
     /// The largest coordinate of usual base colours.
     pub(in crate::packed) most_dc: f64,
-    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) points_of_view: PointsOfView,
+}
+
+/// A chunk of a file.
+#[derive(Debug)]
+struct ChunkRows {
+    layer: usize,
+    /// Its Gaussians, by their index in the file.
+    rows: Range<usize>,
 }
 
 /// A scene that is quantised with one overall step. The Gaussians that stay, the steps, the dictionary and the codes are
@@ -77,8 +85,7 @@ pub struct Quantised<'a> {
     splats: &'a Splats,
     options: &'a PackOptions,
     gaussians: Gaussians,
-    /// The layer of each chunk, and its Gaussians.
-    chunks: Vec<(usize, Range<usize>)>,
+    chunks: Vec<ChunkRows>,
     /// The codes of each chunk.
     codes: Vec<Codes>,
     /// The interim changes of all layers but the last.
@@ -92,14 +99,14 @@ impl<'a> Quantised<'a> {
         options: &'a PackOptions,
         gaussians: Gaussians,
         parameters: Parameters,
-        Fitted { most_dc, mean_view }: Fitted,
+        Fitted { most_dc, points_of_view }: Fitted,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let n = gaussians.keys.len();
         let layering = Layering::new(n, options, gaussians.sensitivities.iter().map(|s| (s.opacity, 1)));
         let ordered = OrderedGaussians::new(splats, &gaussians.keys, &gaussians.classes);
         let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(ordered, parameters, mean_view, options, progress)?;
+        let coder = ChunkCoder::new(ordered, parameters, points_of_view, options, progress)?;
         let encoding = Encoding::new(coder, layering, most_dc, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);
@@ -124,7 +131,7 @@ impl<'a> Quantised<'a> {
             let end = start + count;
             while start < end {
                 let next = start + encoding.layering.next_chunk(layer, end - start);
-                chunks.push((layer, start..next));
+                chunks.push(ChunkRows { layer, rows: start..next });
                 start = next;
             }
         }
@@ -133,10 +140,10 @@ impl<'a> Quantised<'a> {
         let alone = Alone::new(&splats.geometry, &gaussians.keys, &counts, probability);
         let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), alone, encoding };
         let ordered = part.ordered(None)?;
-        let codes = part.chunks.iter().map(|(_, range)| {
+        let codes = part.chunks.iter().map(|ChunkRows { rows, .. }| {
             progress.check()?;
-            let codes = part.encoding.coder.codes(ordered.slice(range.clone()));
-            progress.advance(range.len() as u64);
+            let codes = part.encoding.coder.codes(ordered.slice(rows.clone()));
+            progress.advance(rows.len() as u64);
             Ok(codes)
         });
         part.codes = codes.collect::<Result<_>>()?;
@@ -261,10 +268,10 @@ impl<'a> Quantised<'a> {
     ) -> Vec<Result<T>> {
         let coder = &self.encoding.coder;
         let unit = self.encoding.head.dc_unit();
-        map_vec(self.chunks.iter().zip(&self.codes).collect(), |((layer, range), codes)| {
+        map_vec(self.chunks.iter().zip(&self.codes).collect(), |(ChunkRows { layer, rows }, codes)| {
             progress.check()?;
-            let (tally, mut targets) = coder.targets(ordered.slice(range.clone()), codes, unit)?;
-            for (i, target) in range.clone().zip(&mut targets) {
+            let (tally, mut targets) = coder.targets(ordered.slice(rows.clone()), codes, unit)?;
+            for (i, target) in rows.clone().zip(&mut targets) {
                 target.energy = self.gaussians.sensitivities[i].opacity;
                 if !self.alone.has(*layer) {
                     continue;
@@ -279,7 +286,7 @@ impl<'a> Quantised<'a> {
     /// Returns the number of Gaussians of each layer.
     pub(in crate::packed) fn layer_counts(&self) -> Vec<usize> {
         let mut counts = vec![0; self.encoding.layering.layers()];
-        self.chunks.iter().for_each(|(layer, range)| counts[*layer] += range.len());
+        self.chunks.iter().for_each(|chunk| counts[chunk.layer] += chunk.rows.len());
         counts
     }
 
@@ -288,9 +295,9 @@ impl<'a> Quantised<'a> {
         &self.gaussians.keys
     }
 
-    /// Returns the properties that 3DGS does not define, for the Gaussians `range` in the order of the file.
-    pub(in crate::packed) fn extras(&self, range: Range<usize>) -> Vec<Extra> {
-        let sources = &self.gaussians.keys[range];
+    /// Returns the properties that 3DGS does not define, for the Gaussians `rows` in the order of the file.
+    pub(in crate::packed) fn extras(&self, rows: Range<usize>) -> Vec<Extra> {
+        let sources = &self.gaussians.keys[rows];
         let mut extras = self.splats.geometry.extras.clone();
         for extra in &mut extras {
             for_extra!(&mut extra.values, v => gather(v, sources.iter().map(|g| g.index())));

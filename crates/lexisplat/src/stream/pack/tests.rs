@@ -96,7 +96,7 @@ fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
         let mut expected = Vec::new();
         LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
         assert!(found == expected, "{count}");
-        assert_eq!(done.tensor_bytes, LexiWriter::packed(&packed).attribute_bytes());
+        assert_eq!(done.tensor_bytes, LexiWriter::packed(&packed).tensor_bytes());
         let bits = packed.stream_bits().unwrap();
         for (a, b) in done.report.stream_bits.iter().zip(&bits) {
             assert!((a.bits - b.bits).abs() <= 1e-9 * b.bits, "{a:?} {b:?}");

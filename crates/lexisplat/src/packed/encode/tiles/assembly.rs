@@ -119,7 +119,7 @@ impl<'a> Assembly<'a> {
         let order = (!orders.is_empty()).then_some(orders);
         let spilled = SpilledPacked { data, order, extras: by_column(extras) };
         let writer = LexiWriter::spilled_packed(&head, spilled)?;
-        let tensor_bytes = writer.attribute_bytes().to_vec();
+        let tensor_bytes = writer.tensor_bytes().to_vec();
         writer.write(sink, progress)?;
         Ok(PackedFile { head, report, tensor_bytes })
     }

@@ -8,7 +8,7 @@ use super::message::messages;
 use super::plan::Plan;
 use super::sample::SampleStatistics;
 use super::steps::Steps;
-use crate::packed::bitstream::{MeanView, WholeAtoms};
+use crate::packed::bitstream::{PointsOfView, WholeAtoms};
 use crate::packed::curve::MortonKey;
 use crate::packed::encode::codebook::{Choice, Costs};
 use crate::packed::encode::coder::{ChunkCoder, Learning, VALUES, too_large};
@@ -115,13 +115,13 @@ impl Coding {
     pub(super) fn encoding(&self, plan: &Plan) -> Result<Encoding> {
         plan.check("coding", [self.plan_id], None)?;
         let clock = Stopwatch::start();
-        let mean_view = MeanView::new(&plan.options.viewpoints);
+        let points_of_view = PointsOfView::new(&plan.options.viewpoints);
         let (floor, stop) = (&self.floor, self.steps.stop);
         let mut parameters = floor.parameters.clone();
         parameters.factors[VALUES] *= self.value_step;
         let coder = ChunkCoder::learned(
             parameters,
-            mean_view,
+            points_of_view,
             &self.atoms,
             self.costs.clone(),
             stop,

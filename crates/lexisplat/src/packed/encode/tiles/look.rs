@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::bucket::Bucket;
 use super::message::messages;
 use super::plan::Plan;
-use crate::packed::bitstream::MeanView;
+use crate::packed::bitstream::PointsOfView;
 use crate::packed::encode::fit::{ColourMoments, Derivatives};
 use crate::packed::encode::octaves::{Histogram, RoundedSensitivities};
 use crate::packed::encode::pack::check;
@@ -106,7 +106,7 @@ impl LookStatistics {
                 out.energies.add(opacity);
             }
         }
-        out.colours.add(&MeanView::new(&plan.options.viewpoints).colours(splats));
+        out.colours.add(&PointsOfView::new(&plan.options.viewpoints).colours(splats));
         out.derivatives.add(&splats.geometry, found, &bucket.keys());
         (out, looked)
     }

@@ -8,7 +8,7 @@ use super::look::Looked;
 use super::message::messages;
 use super::plan::Plan;
 use super::steps::Steps;
-use crate::packed::bitstream::MeanView;
+use crate::packed::bitstream::PointsOfView;
 use crate::packed::curve::MortonKey;
 use crate::packed::encode::coder::{OrderedGaussians, SAMPLE, SAMPLE_STREAM};
 use crate::packed::encode::fit::Predictors;
@@ -101,10 +101,10 @@ impl Sample {
     pub fn statistics(&self, plan: &Plan, steps: &Steps) -> Result<SampleStatistics> {
         plan.check("steps", [steps.plan_id], None)?;
         let mut out = SampleStatistics::none(plan);
-        let mean_view = MeanView::new(&plan.options.viewpoints);
+        let points_of_view = PointsOfView::new(&plan.options.viewpoints);
         let parameters = &steps.floor.parameters;
         for bucket in &self.buckets {
-            let dc = mean_view.colours(&bucket.splats);
+            let dc = points_of_view.colours(&bucket.splats);
             let classes = steps.steps.classes_of(&bucket.sensitivities);
             out.predictors.add(&bucket.splats.geometry, &dc, &bucket.keys, &classes, parameters);
             let kept: Vec<MortonKey> = bucket.kept().map(|i| bucket.keys[i]).collect();
