@@ -71,6 +71,7 @@ mod support;
 pub use formats::kind::{FileKind, Unsupported, without_byte_order_mark};
 pub use formats::lexi::{CodeLayout, Layout};
 pub use formats::{lexi, ply};
+pub use scene::dropped::DroppedRows;
 pub use scene::extra::{Extra, ExtraValues};
 pub use scene::joined::Joined;
 pub use scene::moved::unite;

@@ -11,6 +11,7 @@ use super::found::Found;
 use super::layout::REST;
 use super::options::ReadOptions;
 use super::summary::PlySummary;
+use crate::scene::dropped::DroppedRows;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::{SceneMeta, Splats};
@@ -25,8 +26,7 @@ const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
 #[derive(Debug)]
 pub struct PlySource<'a> {
     file: PlyFile<'a>,
-    /// Rows that are left out, ascending.
-    dropped: Vec<usize>,
+    dropped: DroppedRows,
     /// Whether any Gaussian has a normal.
     normals: bool,
     /// The scene, if it was read when the file was opened and is not taken yet.
@@ -101,6 +101,7 @@ impl<'a> PlySource<'a> {
         file.report(&found, options)?;
         let Found { bad: dropped, normals, places, .. } = found;
         file.settle(places);
+        let dropped = DroppedRows::new(dropped);
         Ok((Self { file, dropped, normals, whole: Mutex::default() }, splats))
     }
 
@@ -109,13 +110,7 @@ impl<'a> PlySource<'a> {
         if self.normals {
             self.file.fill_normals(rows.clone(), splats)?;
         }
-        let from = |row: usize| self.dropped.partition_point(|&dropped| dropped < row);
-        let dropped = &self.dropped[from(rows.start)..from(rows.end)];
-        if !dropped.is_empty() {
-            let mut keep = vec![true; rows.len()];
-            dropped.iter().for_each(|&row| keep[row - rows.start] = false);
-            splats.retain(&keep);
-        }
+        self.dropped.remove(rows, splats);
         Ok(())
     }
 
@@ -152,27 +147,12 @@ impl<'a> PlySource<'a> {
     pub fn summary(&self) -> &PlySummary {
         &self.file.summary
     }
-
-    /// Returns the row of Gaussian `gaussian`.
-    fn row(&self, gaussian: usize) -> usize {
-        // `dropped[j] - j` Gaussians come before the dropped row number j.
-        let (mut low, mut high) = (0, self.dropped.len());
-        while low < high {
-            let middle = low.midpoint(high);
-            if self.dropped[middle] - middle <= gaussian {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        gaussian + low
-    }
 }
 
 impl SplatSource for PlySource<'_> {
     /// Returns the number of Gaussians, without those left out.
     fn len(&self) -> usize {
-        self.file.count - self.dropped.len()
+        self.file.count - self.dropped.count()
     }
 
     fn empty(&self) -> Splats {
@@ -196,11 +176,7 @@ impl SplatSource for PlySource<'_> {
     }
 
     fn read(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
-        check_range(&range, self.len())?;
-        let rows = match range.end.checked_sub(1) {
-            Some(last) if last >= range.start => self.row(range.start)..self.row(last) + 1,
-            _ => 0..0,
-        };
+        let rows = self.dropped.rows(&range, self.file.count)?;
         self.file.check_memory(rows.len(), self.normals)?;
         self.file.fill(rows.clone(), splats, &Silent)?;
         self.finish(rows, splats)
@@ -226,7 +202,7 @@ impl SplatSource for PlySource<'_> {
         }
         // Neighbours in the file are read together, because a line of text is searched for from the last known line on.
         let mut order: Vec<(usize, usize)> =
-            gaussians.iter().enumerate().map(|(k, &gaussian)| (self.row(gaussian), k)).collect();
+            gaussians.iter().enumerate().map(|(k, &gaussian)| (self.dropped.row(gaussian), k)).collect();
         order.sort_unstable();
         let row_bytes = self.file.layout.row_bytes;
         for group in order.chunk_by(|a, b| a.0 / ROWS_PER_TASK == b.0 / ROWS_PER_TASK) {

@@ -27,11 +27,6 @@ pub(in crate::packed) struct SymbolRecorder {
     lanes: [Vec<u32>; LANES],
 }
 
-/// Returns the entry of a symbol.
-fn symbol_entry(context: usize, symbol: u32) -> u32 {
-    (context as u32) << 8 | symbol
-}
-
 impl Symbols for SymbolRecorder {
     fn symbols(
         &mut self,
@@ -43,7 +38,7 @@ impl Symbols for SymbolRecorder {
         let mut out = [0; LANES];
         for l in (0..LANES).filter(|&l| has(set, l)) {
             out[l] = value(l);
-            self.lanes[l].push(symbol_entry(slot.place(context[l]), out[l]));
+            self.lanes[l].push((slot.place(context[l]) as u32) << 8 | out[l]);
         }
         out
     }

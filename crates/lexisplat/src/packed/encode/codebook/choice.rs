@@ -59,7 +59,11 @@ pub(in crate::packed) fn choose(
         let fixed = fixed.len() / dim;
         let (learned, costs) = learn(dim, &scaled, classes, first, fixed, StopRule::Balanced, progress)?;
         let usual = bits_of(&scaled, &learned, &costs);
-        if !with_axes && Codebook::new(dim, learned.clone(), costs.clone()).uses_nothing(&scaled, classes) {
+        let no_code_pays = || {
+            let book = Codebook::new(dim, learned.clone(), costs.clone());
+            book.encode(&scaled, classes, StopRule::Balanced).pairs.is_empty()
+        };
+        if !with_axes && no_code_pays() {
             // A dictionary has at least one atom.
             let atoms = WholeAtoms::new(degree, &unit_axis(dim, 0).collect::<Vec<f32>>(), LEAST_BITS, false);
             return Ok(Choice { atoms, costs: Costs::initial(1, dim), step });

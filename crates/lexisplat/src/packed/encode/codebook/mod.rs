@@ -132,11 +132,6 @@ impl Codebook {
         all
     }
 
-    /// Returns whether the codes of all rows are empty.
-    fn uses_nothing(&self, rows: &[f32], classes: &[u8]) -> bool {
-        self.encode(rows, classes, StopRule::Balanced).pairs.is_empty()
-    }
-
     /// Returns the sums over the codes of all rows.
     fn rate_and_distortion(&self, rows: &[f32], classes: &[u8]) -> RateAndDistortion {
         let codes = self.encode(rows, classes, StopRule::Balanced);

@@ -78,7 +78,7 @@ impl Bucket {
         };
         check(&self.splats, &sensitivity)?;
         let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
-        Ok((statistics, looked.with_observer(scale, memo)))
+        Ok((statistics, Looked { scale, memo, ..looked }))
     }
 }
 
@@ -137,10 +137,6 @@ impl Looked {
             scale: 1.0,
             memo: Vec::new(),
         }
-    }
-
-    pub(super) fn with_observer(self, scale: f32, memo: Vec<u8>) -> Self {
-        Self { scale, memo, ..self }
     }
 
     /// Returns the observer's own sensitivities, given the `scaled` ones.
