@@ -41,10 +41,10 @@ pub(crate) fn carry(
             Task { moments, position, scale, rotation, opacity, colour, removal, removal_view }
         })
         .collect();
-    tasks.into_par_iter().enumerate().for_each(|(task, mut part)| {
+    tasks.into_par_iter().enumerate().for_each(|(task, mut gaussians)| {
         simd.dispatch(
             #[inline(always)]
-            || part.carry(projection, geometry, task * GAUSSIANS_PER_TASK, [alone, share]),
+            || gaussians.carry(projection, geometry, task * GAUSSIANS_PER_TASK, [alone, share]),
         );
     });
 }

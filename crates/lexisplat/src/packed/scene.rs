@@ -12,7 +12,7 @@ use crate::support::spill::{Spilled, Woven};
 /// The file name in errors about a packed scene that was not read from a file.
 pub(super) const UNNAMED: &str = "the packed scene";
 
-/// The parts of a packed scene whose size does not depend on the number of Gaussians.
+/// The head of a packed scene: everything whose size does not depend on the number of Gaussians.
 #[derive(Debug, Clone)]
 pub struct PackedHead {
     /// The file name, as the caller gave it. It is used in errors.
@@ -68,7 +68,7 @@ impl Packed {
         Self { head, extras, order, data }
     }
 
-    /// Returns the parts whose size does not depend on the number of Gaussians.
+    /// Returns the head.
     #[must_use]
     pub fn head(&self) -> &PackedHead {
         &self.head
@@ -140,7 +140,7 @@ impl Packed {
     }
 }
 
-/// The parts of a packed scene whose size grows with the number of Gaussians, in spill files.
+/// The ranges, the order and the extras of a packed scene, in spill files. Their size grows with the number of Gaussians.
 #[cfg(feature = "encode")]
 #[derive(Debug)]
 pub(crate) struct SpilledPacked {

@@ -127,9 +127,9 @@ fn in_buckets<E: From<Error>>(
     let clock = Stopwatch::start();
     let folder = sink.spill_folder()?;
     let to = SpillTo::Folder(&folder);
-    let tiles = match source.parts() {
+    let tiles = match source.tiles() {
         [] => vec![source],
-        parts => parts.to_vec(),
+        tiles => tiles.to_vec(),
     };
     begin_reading(&tiles, progress);
     let surveys = survey(&tiles, options.seed, progress)?;

@@ -200,12 +200,12 @@ impl Encoding {
     ) -> Result<Finished> {
         let Self { coder, layering, mut head, counts, learn_seconds, clock, .. } = self;
         let stream_bits = counts.bits(tables).named();
-        let parts = head.rest.least.len();
-        let forms = layering.forms(parts);
+        let sh_parts = head.rest.least.len();
+        let forms = layering.forms(sh_parts);
         let Ranges { spill, mut chunks, .. } = ranges;
         chunks.sort_by_key(|(chunk, _): &(Chunk, f64)| chunk.layer);
         let (chunks, energies): (Vec<Chunk>, Vec<f64>) = chunks.into_iter().unzip();
-        let order = layering.order(&chunks, &energies, parts);
+        let order = layering.order(&chunks, &energies, sh_parts);
         let piece = |place: &Place| {
             let range = &chunks[place.chunk as usize].ranges[usize::from(place.kind)];
             (range.start, range.length as usize)

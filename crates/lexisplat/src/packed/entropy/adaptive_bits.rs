@@ -1,4 +1,4 @@
-//! Bits with adaptive probabilities, for the parts of a file that are written once: the integers of its head, tables and
+//! Bits with adaptive probabilities, for data that a file has once: the integers of its head, tables and
 //! dictionary.
 //!
 //! They are coded by rANS, as the symbols of a lane are ([`crate::packed::entropy::rans_decoder`]), with tables of two
@@ -155,7 +155,7 @@ impl<'a> BitDecoder<'a> {
         u16::from_le_bytes(word).into()
     }
 
-    /// Returns a broken rule of the part `name` of the head unless an encoder may have written the bytes, and wrote no more
+    /// Returns a broken rule of the block `name` of the head unless an encoder may have written the bytes, and wrote no more
     /// bits than were taken.
     pub(in crate::packed) fn finish(&self, name: &str) -> Result<(), BrokenHead> {
         if let Some(broken) = self.broken {

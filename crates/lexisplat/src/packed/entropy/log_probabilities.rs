@@ -18,9 +18,9 @@ const FIRST_BITS: u32 = 5;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct LogProbabilities(Vec<(u32, bool)>);
 
-/// The adaptive probabilities of the parts of tables.
+/// The adaptive probabilities of the bits of tables.
 #[derive(Debug, Default)]
-pub(in crate::packed) struct LevelBitModels {
+pub(in crate::packed) struct TableBitModels {
     counts: [BitModel; COUNT_BITS + 1],
     /// Whether a symbol occurs, by whether the symbol before does.
     occurs: [BitModel; 2],
@@ -40,10 +40,10 @@ impl LogProbabilities {
     pub(in crate::packed) fn code(
         &self,
         bits: &mut dyn Bits,
-        odds: &mut LevelBitModels,
+        models: &mut TableBitModels,
         precision: u32,
     ) -> Result<Self, BrokenHead> {
-        let count = bits.positive(&mut odds.counts, self.0.len() as u32) as usize;
+        let count = bits.positive(&mut models.counts, self.0.len() as u32) as usize;
         must(count <= MAX_SYMBOLS, || {
             format!("the tables: a table has {count} symbols, above {MAX_SYMBOLS}")
         })?;
@@ -51,13 +51,13 @@ impl LogProbabilities {
         for i in 0..count {
             let (level, occurs) = self.0.get(i).copied().unwrap_or_default();
             let before = symbols.last().copied();
-            let by = &mut odds.occurs[usize::from(before.is_none_or(|before| before.1))];
+            let by = &mut models.occurs[usize::from(before.is_none_or(|before| before.1))];
             let occurs = i + 1 == count || bits.bit(by, occurs);
             let level = match before {
                 None => bits.even(FIRST_BITS, level),
                 Some((before, _)) if !occurs => before,
                 Some((before, _)) => {
-                    let delta = bits.signed(&mut odds.delta, level.cast_signed() - before.cast_signed());
+                    let delta = bits.signed(&mut models.delta, level.cast_signed() - before.cast_signed());
                     before.checked_add_signed(delta).unwrap_or(u32::MAX)
                 }
             };
@@ -119,13 +119,13 @@ impl<'a> Fit<'a> {
         let levels = most_level(precision) as usize + 1;
         let octaves = |level: usize| level as f32 / LEVELS_PER_OCTAVE as f32;
         let total: f32 = counts.iter().map(|&count| count as f32).sum();
-        // Probabilities are divided by the sum of all, so the probability at a level takes a part of all others.
-        let part: Vec<f32> = (0..levels)
+        // Probabilities are divided by their sum, so a probability lowers all others. This is its cost in bits.
+        let share: Vec<f32> = (0..levels)
             .map(|level| total * libm::exp2f(-octaves(level)) * std::f32::consts::LOG2_E)
             .collect();
         let own = |&count: &u32| -> Vec<[f32; 2]> {
             let absent = if count == 0 { 0.0 } else { f32::INFINITY };
-            let bits = |level: usize| count as f32 * octaves(level) + part[level];
+            let bits = |level: usize| count as f32 * octaves(level) + share[level];
             (0..levels).map(|level| [absent, bits(level)]).collect()
         };
         let mut fit = Self { counts, levels, bits: counts.iter().map(own).collect() };

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::packed::bitstream::broken::{BrokenHead, must};
 use crate::packed::bitstream::streams::{CONTEXTS, SLOTS, Slot};
 use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, BitModel, Bits};
-use crate::packed::entropy::log_probabilities::{LevelBitModels, LogProbabilities, MAX_SYMBOLS};
+use crate::packed::entropy::log_probabilities::{LogProbabilities, MAX_SYMBOLS, TableBitModels};
 use crate::packed::entropy::rans_state::Interval;
 
 /// Estimates of the bits of a table, and of each of its symbols, for the first pass that joins contexts.
@@ -207,7 +207,7 @@ impl Tables {
     }
 }
 
-/// The adaptive probabilities of the parts of [`Tables`].
+/// The adaptive probabilities of the bits of [`Tables`].
 #[derive(Debug, Default)]
 struct TablesOdds {
     /// Whether a set of contexts is used, by whether the set before is.
@@ -219,7 +219,7 @@ struct TablesOdds {
     changed: bool,
     /// Whether the other table is one that no earlier context of the set has.
     new: BitModel,
-    levels: LevelBitModels,
+    levels: TableBitModels,
 }
 
 /// A group of contexts that share a table.

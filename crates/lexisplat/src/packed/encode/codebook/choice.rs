@@ -9,7 +9,7 @@ use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 
 /// Divisors of the number of atoms that a scene justifies. Each quotient is tried as the number of learned atoms.
-const PARTS: [usize; 3] = [4, 2, 1];
+const DIVISORS: [usize; 3] = [4, 2, 1];
 /// Steps of values that are tried, as shares of the usual step. With few atoms, errors are larger at the same step.
 const STEPS: [f32; 5] = [1.0, 0.9, 0.8, 0.7, 0.6];
 /// Price of an error above that of the reference, as a multiple of the usual price of an error. The reference is the first
@@ -45,7 +45,7 @@ pub(in crate::packed) fn choose(
 ) -> Result<Choice> {
     let dim = degree.rest();
     let mut tried: Vec<(usize, bool, f32)> = vec![(pays.max(dim), false, 1.0)];
-    let mut counts: Vec<usize> = PARTS.iter().map(|part| pays / part).collect();
+    let mut counts: Vec<usize> = DIVISORS.iter().map(|divisor| pays / divisor).collect();
     counts.insert(0, 0);
     counts.dedup();
     tried.extend(STEPS.iter().flat_map(|&step| counts.iter().map(move |&count| (count, true, step))));
