@@ -5,7 +5,7 @@ use lexisplat::{Geometry, Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
 
 use crate::error::{Error, Result};
-use crate::found::{Found, GENERATED_SIZE, evenly, find};
+use crate::found::{Found, GENERATED_SIZE, ViewCounts, evenly, find};
 use crate::sharp_views::sampled;
 use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints};
 
@@ -127,7 +127,7 @@ pub fn judging_views(
     progress: &dyn Progress,
 ) -> Result<Vec<Camera>> {
     let more = around(splats).into_iter().skip(1).step_by(2).collect();
-    Ok(find(renderer, splats, more, [count, count], progress)?.judges)
+    Ok(find(renderer, splats, more, ViewCounts { measuring: count, judging: count }, progress)?.judges)
 }
 
 /// Returns views from all around `splats`.
@@ -138,10 +138,11 @@ fn around(splats: &Splats) -> Vec<Camera> {
 }
 
 /// Returns the numbers of found views of `splats` for measuring and for judging.
-fn found_views(splats: &Splats) -> [usize; 2] {
+fn found_views(splats: &Splats) -> ViewCounts {
     let views = (splats.len() / GAUSSIANS_OF_A_VIEW).clamp(*FOUND_VIEWS.start(), *FOUND_VIEWS.end());
     let measuring = views.max(splats.len() / GAUSSIANS_OF_A_LARGE_VIEW).min(MOST_FOUND_VIEWS);
-    [measuring, (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end())]
+    let judging = (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end());
+    ViewCounts { measuring, judging }
 }
 
 /// The views that packing draws: some measure the sensitivity, some judge the result.

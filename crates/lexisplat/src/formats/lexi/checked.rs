@@ -189,13 +189,13 @@ impl<'a> Checked<'a> {
     fn is_there(&self, name: &str) -> bool {
         self.header
             .info(name)
-            .is_some_and(|tensor| tensor.data_offsets.1 <= self.bytes().len() - self.data_start)
+            .is_some_and(|tensor| tensor.data_offsets.end <= self.bytes().len() - self.data_start)
     }
 
     /// Returns the position at which the tensor `name` starts in the file, its length, and its first bytes, as many as are
     /// there.
     pub(super) fn first_of(&self, name: &str) -> Option<(u64, u64, &[u8])> {
-        let (start, end) = self.header.info(name)?.data_offsets;
+        let Range { start, end } = self.header.info(name)?.data_offsets;
         let place = |offset: usize| self.data_start.saturating_add(offset);
         let there = |offset: usize| place(offset).min(self.bytes().len());
         Some((place(start) as u64, (end - start) as u64, self.bytes().get(there(start)..there(end))?))
@@ -271,7 +271,7 @@ impl<'a> Checked<'a> {
 
     pub(super) fn tensor(&self, name: &str) -> Result<StoredTensor<'_>> {
         let missing = || self.malformed(format!("tensor '{name}' is missing"));
-        let TensorInfo { dtype, shape, data_offsets: (start, end) } =
+        let TensorInfo { dtype, shape, data_offsets: Range { start, end } } =
             self.header.info(name).ok_or_else(missing)?;
         let (start, end) = (self.data_start.saturating_add(*start), self.data_start.saturating_add(*end));
         let data = self.bytes().get(start..end).ok_or_else(|| {
@@ -374,7 +374,7 @@ pub(super) fn header_end(file: &str, bytes: &[u8], limits: &Limits) -> Result<u6
 pub(super) fn start_end(file: &str, bytes: &[u8], header_end: u64) -> Result<u64> {
     let header = usize::try_from(header_end).ok().and_then(|end| bytes.get(..end)).unwrap_or_default();
     let header = read_header(file, header)?;
-    let end = |name| header.info(name).map_or(0, |tensor| tensor.data_offsets.1 as u64);
+    let end = |name| header.info(name).map_or(0, |tensor| tensor.data_offsets.end as u64);
     Ok(header_end.saturating_add(end(tensor::HEADER_CHECKSUM).max(end(tensor::HEAD))))
 }
 
