@@ -30,7 +30,6 @@
 //!
 //! A scene in parts goes through steps 1 to 4 part by part ([`tiles`]). docs/METHOD.md has the reasons and the figures.
 
-mod alone;
 mod beginning;
 mod belonging;
 mod decibels;
@@ -39,6 +38,7 @@ mod error;
 mod facts;
 mod fewer;
 mod found;
+mod interim;
 mod judge;
 mod layout;
 mod memo;

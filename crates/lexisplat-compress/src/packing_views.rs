@@ -65,9 +65,9 @@ const FITTED_FOUND: usize = 64;
 const FITTED_GIVEN: usize = 40;
 /// Number of views from all around to which base colours and opacities are fitted too, beside given cameras.
 const FITTED_AROUND: usize = 8;
-/// Share of the judging views that viewpoints are chosen from: those whose positions are nearest to the one in the middle.
+/// Share of the judging views that points of view are chosen from: the views nearest to the view in the middle.
 const USUAL_VIEWS: f32 = 0.67;
-/// Weight of the guess in [`Sensitivity::blend_with_prior`]. It is the best weight on held-out views (docs/METHOD.md).
+/// Share of the guess in [`Sensitivity::blend_with_prior`]. It is the best share on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
 
 /// A number of pixels: `always + each * gaussians`, and at most `most`.

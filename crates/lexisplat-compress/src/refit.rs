@@ -11,9 +11,9 @@ use lexisplat::sh::C0;
 use lexisplat::{AppearanceSensitivity, CompressReport, Geometry, Progress, Splats, Stage};
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
 
-use crate::alone::alone;
 use crate::drawing::{DrawOptions, draw_views};
 use crate::error::Result;
+use crate::interim::interim_changes;
 use crate::only_cancels::OneStep;
 use crate::solve::{ROW, kinds, solve};
 
@@ -123,7 +123,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         let (Some(fit), Some(shown)) = (&self.fit, shown) else { return Ok(file) };
         let Some(first) = file.0.first_layer()? else { return Ok(file) };
         drop(file);
-        let changes = alone(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
+        let changes = interim_changes(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
         Ok(quantised.finish(Some(&shown), Some(&changes), progress)?)
     }
 

@@ -97,7 +97,7 @@ pub struct CompressionReport {
 }
 
 /// Returns by how much the worst view falls short of the judged quality, in dB, if this exceeds 8 dB: photographs may then
-/// be as hard as that view. Returns `None` for a smaller difference, and for given views, because those are what counts.
+/// be as hard as that view. Returns `None` for a smaller difference, and for given views, which are the views that count.
 #[must_use]
 pub fn uncertain_by(reached: &ReachedRecord) -> Option<f64> {
     let below = reached.judged_psnr - reached.min_psnr;

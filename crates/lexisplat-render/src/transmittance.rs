@@ -10,7 +10,7 @@ use crate::parallel::*;
 /// the number of threads.
 const GAUSSIANS_PER_TASK: usize = 8192;
 /// Largest number of Gaussians that are looked at. Of a larger scene every second, every third and so on is looked at,
-/// and counts two, three and so on times. This is enough to tell what is in the way, and takes seconds for the largest
+/// and counts two, three and so on times. This is enough to find opaque Gaussians in the way, and takes seconds for the largest
 /// scenes.
 const MAX_ASKED: usize = 1 << 20;
 /// Number of standard deviations beyond which every Gaussian is below [`ALPHA_MIN`]: `sqrt(2 ln 255)`.

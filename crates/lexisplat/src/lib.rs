@@ -23,7 +23,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! For files several times smaller, quantised throughout by what shows in pictures, there is [`packed`]:
+//! [`packed`] makes files several times smaller. It quantises all values as coarsely as pictures allow:
 //!
 //! ```
 //! use lexisplat::packed::{PackOptions, Packer};
@@ -43,12 +43,12 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`compress()`] does everything; [`mod@learn`] and [`pursuit`] are its parts. [`ply`] and [`lexi`] are the
-//! files, [`Splats`] and [`Model`] what they hold. docs/METHOD.md has the mathematics, docs/FORMAT.md the
-//! file.
+//! [`compress()`] learns a dictionary ([`mod@learn`]) and codes every Gaussian with it ([`pursuit`]). [`ply`] and [`lexi`] read
+//! and write files. [`Splats`] is the scene of a PLY, and [`Model`] that of a .lexi. docs/METHOD.md has the mathematics,
+//! docs/FORMAT.md the file.
 //!
 //! The features `encode`, `parallel` and `mmap` are on by default. Without `encode` the crate reads every file, and neither learns
-//! nor packs. Without the other two it needs neither threads nor files and builds for `wasm32-unknown-unknown`; results are the
+//! nor packs. Without the other two it needs neither threads nor files, and builds for `wasm32-unknown-unknown`. Results are the
 //! same bit for bit.
 
 #![cfg_attr(

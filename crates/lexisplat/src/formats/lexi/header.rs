@@ -45,7 +45,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Reads the JSON `text`. The error says what is wrong with it.
+    /// Reads the JSON `text`. The error is the fault of the text.
     pub(super) fn read(text: &[u8]) -> Result<Self, String> {
         if text.first() != Some(&b'{') {
             return Err(invalid("byte 8 is not '{'"));

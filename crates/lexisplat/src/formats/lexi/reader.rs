@@ -134,7 +134,7 @@ impl<'a> LexiReader<'a> {
     }
 
     /// Decodes at most `sh_parts` SH parts from here on. The first has the largest values. With 0 SH parts there is no
-    /// SH-rest, and base colours are those that are seen on average.
+    /// SH-rest, and base colours are the average colours that are seen.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a file that is not packed. It has no SH parts.
@@ -220,7 +220,7 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// Returns the record of how the file was made and what it promises.
+    /// Returns the record of the making of the file and of its promises.
     #[must_use]
     pub fn record(&self) -> &Record {
         match &self.kind {

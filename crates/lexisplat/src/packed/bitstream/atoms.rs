@@ -50,7 +50,7 @@ impl WholeAtoms {
         Self { degree, numbers, with_axes }
     }
 
-    /// Codes the numbers of `learned` atoms. A decoder passes no numbers; the result has those that it decoded.
+    /// Codes the numbers of `learned` atoms. A decoder passes no numbers. The result has the decoded numbers.
     fn code(&self, coder: &mut dyn Bits, learned: usize) -> Self {
         let per_channel = self.degree.rest_per_channel();
         let mut odds = [[[SignedBitModel::default(); SIZES]; CHANNELS]; DEGREES];
@@ -104,7 +104,7 @@ impl WholeAtoms {
     /// Reads the bytes that [`Self::write`] wrote for `learned` atoms.
     ///
     /// # Errors
-    /// The broken rule for bytes that are not the bits of so many atoms, or not of these alone.
+    /// The broken rule for bytes that are not exactly the bits of these atoms.
     pub(in crate::packed) fn read(
         bytes: &[u8],
         degree: ShDegree,

@@ -1,9 +1,9 @@
 //! Coding of a chunk: its ranges are a base, refinements, SH parts and interim changes, all in the same lanes.
 
 use super::coarseness::Refinements;
-use super::fill_in::interim;
 use super::geometry_syntax::{GeometrySyntax, Group};
 use super::integer_model::Steering;
+use super::interim::interim;
 use super::parameters::CHANGES;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest, RestForm};

@@ -125,27 +125,27 @@ impl Index {
 
     /// Returns the cells where the base of the next layer is missing; none if `layer` has no interim changes. `there`
     /// returns whether a range is there.
-    pub(in crate::packed) fn alone(
+    pub(in crate::packed) fn uncovered(
         &self,
         layer: usize,
         there: impl Fn(&Range) -> bool,
     ) -> Vec<std::ops::Range<u64>> {
-        let mut alone: Vec<std::ops::Range<u64>> = Vec::new();
+        let mut uncovered: Vec<std::ops::Range<u64>> = Vec::new();
         if !self.layer(layer).interim {
-            return alone;
+            return uncovered;
         }
         let mut next = self.chunks.iter().filter(|chunk| chunk.layer == layer + 1).peekable();
         let mut start = 0;
         while let Some(chunk) = next.next() {
             let end = next.peek().map_or(u64::MAX, |chunk| chunk.cell);
-            match alone.last_mut() {
+            match uncovered.last_mut() {
                 _ if chunk.ranges.first().is_some_and(&there) => {}
                 Some(last) if last.end == start => last.end = end,
-                _ => alone.push(start..end),
+                _ => uncovered.push(start..end),
             }
             start = end;
         }
-        alone
+        uncovered
     }
 
     /// Returns the chunks of the next layer whose cells overlap those of chunk `c`, or may; none if the layer of `c` has no
@@ -294,7 +294,7 @@ impl Index {
     }
 }
 
-/// Rounds bounds outward to numbers of which only the two high bytes are not 0.
+/// Rounds bounds outward to numbers whose two low bytes are 0.
 fn widened([least, most]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
     // `near` rounds towards zero, and `far` away from it.
     let near = |x: f32| f32::from_bits(x.to_bits() >> 16 << 16);

@@ -19,7 +19,7 @@ pub(in crate::packed) const MAX_POINTS: usize = 15;
 /// Largest number of coefficients of one channel of SH-rest.
 pub(in crate::packed) const MOST: usize = MAX_COEFFICIENTS - 1;
 
-/// The points of view of a file. Without points, base colours are those of the source. Their coordinates are f24.
+/// The points of view of a file. Without points, base colours are those of the source. Coordinates of points are f24.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct PointsOfView {
     pub(in crate::packed) points: Vec<Vec3>,

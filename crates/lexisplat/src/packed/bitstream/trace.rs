@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use super::chunk::{LayerForm, starts};
-use super::fill_in::interim;
 use super::geometry_syntax::{GeometrySyntax, Group};
+use super::interim::interim;
 use super::parameters::CHANGES;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest};

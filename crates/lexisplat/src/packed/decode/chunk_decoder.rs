@@ -88,10 +88,10 @@ impl BitstreamDecoder {
         let index = &self.head.index;
         let chunk = index.chunks.get(c).ok_or_else(|| damaged("is not in the index"))?;
         let form = index.layer(chunk.layer);
-        let alone = index.alone(chunk.layer, |range| data.came(range.start, range.length));
+        let uncovered = index.uncovered(chunk.layer, |range| data.came(range.start, range.length));
         let is_wanted = |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(k) if k >= options.sh_parts);
         let mut ranges = self.checked(data, c, chunk, is_wanted)?;
-        if alone.is_empty()
+        if uncovered.is_empty()
             && !count_bits
             && !options.verify
             && let Some(interim) = ranges.get_mut(form.interim_range())
@@ -99,7 +99,7 @@ impl BitstreamDecoder {
             *interim = None;
         }
         let want = Want { sums: options.verify, bits: count_bits };
-        let piece = self.unpacker.chunk(form, chunk.cell, &alone, &ranges, want, place, budget);
+        let piece = self.unpacker.chunk(form, chunk.cell, &uncovered, &ranges, want, place, budget);
         let (mut piece, sums) = piece.map_err(|refusal| match refusal {
             Refusal::Damaged(InRange { range, broken: Broken(rule) }) => {
                 let kind = RangeKind::of(form, range);

@@ -34,7 +34,7 @@ pub(in crate::packed) struct Unpacker {
 
 impl Unpacker {
     /// Decodes a chunk of `layer` into `place`, from the ranges that are there. `cell` is the cell of its first Gaussian.
-    /// Gaussians in the cells `alone` get interim changes. Escapes are numbered from the start of the chunk. `budget`
+    /// Gaussians in the cells `uncovered` get interim changes. Escapes are numbered from the start of the chunk. `budget`
     /// already holds everything but the codes, which are added to it. Returns the codes, and the checksums of integers if
     /// they are wanted.
     #[expect(clippy::too_many_arguments, reason = "what is decoded, from what and where to")]
@@ -42,14 +42,14 @@ impl Unpacker {
         &self,
         layer: LayerForm,
         cell: u64,
-        alone: &[Range<u64>],
+        uncovered: &[Range<u64>],
         ranges: &[Option<&[u8]>],
         want: Want,
         place: &mut Place<'_>,
         budget: &MemoryBudget<'_>,
     ) -> Result<(Piece, Vec<u32>), Refusal> {
         // Registers of 512 bits were measured to be 5 to 10 % slower.
-        Simd::current().narrow().run(Job { with: self, layer, cell, alone, ranges, want, place, budget })
+        Simd::current().narrow().run(Job { with: self, layer, cell, uncovered, ranges, want, place, budget })
     }
 }
 
@@ -65,7 +65,7 @@ struct Job<'j, 'p, 'r> {
     with: &'j Unpacker,
     layer: LayerForm,
     cell: u64,
-    alone: &'j [Range<u64>],
+    uncovered: &'j [Range<u64>],
     ranges: &'j [Option<&'r [u8]>],
     want: Want,
     place: &'j mut Place<'p>,
@@ -86,7 +86,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let Self { with, layer, cell, alone, ranges, want, place, budget } = self;
+        let Self { with, layer, cell, uncovered, ranges, want, place, budget } = self;
         let n = place.counts.len();
         let starts = starts(n, crate::packed::bitstream::chunk::lanes(n));
         let blank = [[0.0; LANES]; 3];
@@ -95,7 +95,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             with,
             place,
             cell,
-            alone,
+            uncovered,
             starts,
             nonzeros: Lanes::default(),
             escapes: Lanes::default(),
@@ -141,7 +141,7 @@ struct Out<'j, 'p> {
     /// The cell of the first Gaussian.
     cell: u64,
     /// Cells around which the next layer is missing.
-    alone: &'j [Range<u64>],
+    uncovered: &'j [Range<u64>],
     /// Index of the first Gaussian of each lane.
     starts: [usize; LANES + 1],
     /// The nonzeros of each lane. Those of one Gaussian are in ascending order of atoms.
@@ -168,10 +168,10 @@ impl Sink for Out<'_, '_> {
         if number == 0 && group.number[0] != self.cell {
             return Err(Broken("begins with another cell than the index says"));
         }
-        let is_alone =
-            |l: usize| has(set, l) && self.alone.iter().any(|cells| cells.contains(&group.number[l]));
-        let alone = if self.alone.is_empty() { [false; LANES] } else { each(is_alone) };
-        let drawn = Drawn::new(&self.with.frame, group, refinements, &alone);
+        let is_interim =
+            |l: usize| has(set, l) && self.uncovered.iter().any(|cells| cells.contains(&group.number[l]));
+        let interim = if self.uncovered.is_empty() { [false; LANES] } else { each(is_interim) };
+        let drawn = Drawn::new(&self.with.frame, group, refinements, &interim);
         if let Some(position) = self.positions.get_mut(in_block) {
             *position = drawn.position;
         }

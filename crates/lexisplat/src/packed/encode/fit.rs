@@ -266,7 +266,7 @@ impl Default for Derivatives {
 }
 
 impl Derivatives {
-    /// Adds the Gaussians of `keys`. Those with the smallest sensitivities do not count.
+    /// Adds the Gaussians of `keys`. Gaussians with the smallest sensitivities do not count.
     pub(in crate::packed) fn add(
         &mut self,
         geometry: &Geometry,

@@ -1,6 +1,6 @@
-//! The floor: the coarsest steps that a visible Gaussian may have, whatever sensitivity was measured.
+//! The floor: the coarsest steps that a visible Gaussian may have at any sensitivity.
 //!
-//! The measured views do not show what other views show. The limits are shares of a Gaussian's own size, turn, opacity and
+//! Other views may show Gaussians that the measured views hardly show. The limits are shares of a Gaussian's own size, turn, opacity and
 //! colour, so that another view may look worse but not broken (docs/METHOD.md, "The floor").
 
 use serde::{Deserialize, Serialize};

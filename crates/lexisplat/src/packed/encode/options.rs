@@ -24,7 +24,7 @@ pub struct PackOptions {
     pub atoms: Option<usize>,
     /// Stores the place of each Gaussian in the source. Then no Gaussian is left out.
     pub keep_order: bool,
-    /// Leaves no Gaussian out, and keeps base colours and opacities. A tolerance does so too.
+    /// Leaves no Gaussian out, and keeps base colours and opacities. A tolerance has the same effect.
     pub keep_all: bool,
     /// Seed of the learning sample.
     pub seed: u64,
@@ -35,7 +35,7 @@ pub struct PackOptions {
     /// have one layer. Default 8,000; `usize::MAX` for one layer always.
     pub layers_from: usize,
     /// Most Gaussians of the first layer, with levels of detail. A scene then has more layers, each of about five times as
-    /// many Gaussians as the layers before it, so that readers draw what is far with few Gaussians
+    /// many Gaussians as the layers before it, so that readers draw distant Gaussians from few layers
     /// ([`Outline::select`](crate::packed::Outline::select)). docs/results/lod.md has their bytes. Default `None`: two layers.
     pub lod: Option<usize>,
 }

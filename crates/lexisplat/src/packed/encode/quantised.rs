@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::alone::Alone;
 use super::appearance::{Appearance, AppearanceChange};
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, OrderedGaussians, too_large};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written};
+use super::interim::InterimChanges;
 use super::layering::Layering;
 use super::options::PackOptions;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
@@ -89,7 +89,7 @@ pub struct Quantised<'a> {
     /// The codes of each chunk.
     codes: Vec<Codes>,
     /// The interim changes of all layers but the last.
-    alone: Alone,
+    interim: InterimChanges,
     encoding: Encoding,
 }
 
@@ -137,8 +137,8 @@ impl<'a> Quantised<'a> {
         }
         let probability =
             |layer: usize, i: usize| encoding.layering.probability(layer, gaussians.sensitivities[i].opacity);
-        let alone = Alone::new(&splats.geometry, &gaussians.keys, &counts, probability);
-        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), alone, encoding };
+        let interim = InterimChanges::new(&splats.geometry, &gaussians.keys, &counts, probability);
+        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), interim, encoding };
         let ordered = part.ordered(None)?;
         let codes = part.chunks.iter().map(|ChunkRows { rows, .. }| {
             progress.check()?;
@@ -170,7 +170,7 @@ impl<'a> Quantised<'a> {
 
     /// Makes the file. `appearances` replaces the scene's own base colours and opacities, with one entry for each Gaussian
     /// in the order of the file. `changes` are the interim changes of the Gaussians of the first layer, for the time while
-    /// the second layer is missing. They are relative to what [`Packed::first_layer`] shows.
+    /// the second layer is missing. They are relative to the scene of [`Packed::first_layer`].
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are more or fewer entries than Gaussians, if values are not finite, if an opacity is
@@ -273,11 +273,11 @@ impl<'a> Quantised<'a> {
             let (tally, mut targets) = coder.targets(ordered.slice(rows.clone()), codes, unit)?;
             for (i, target) in rows.clone().zip(&mut targets) {
                 target.energy = self.gaussians.sensitivities[i].opacity;
-                if !self.alone.has(*layer) {
+                if !self.interim.has(*layer) {
                     continue;
                 }
                 let change = ordered.changes.and_then(|changes| changes.get(i));
-                target.interim = self.alone.steps(i, change, &coder.parameters);
+                target.interim = self.interim.steps(i, change, &coder.parameters);
             }
             with(*layer, tally, targets)
         })

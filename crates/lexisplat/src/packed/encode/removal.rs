@@ -1,4 +1,4 @@
-//! Which Gaussians a packed file leaves out.
+//! The choice of the Gaussians that a packed file leaves out.
 
 use crate::packed::curve::MortonKey;
 use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity};

@@ -1,8 +1,8 @@
 //! Recoding of the ranges of a chunk with other tables.
 
 use crate::packed::bitstream::chunk::{Form, LayerForm, lanes, sets};
-use crate::packed::bitstream::fill_in::interim;
 use crate::packed::bitstream::geometry_syntax::{GeometrySyntax, Group};
+use crate::packed::bitstream::interim::interim;
 use crate::packed::bitstream::parameters::CHANGES;
 use crate::packed::bitstream::refinement::refine;
 use crate::packed::bitstream::sh_codes::{BLOCK, Rest};

@@ -82,7 +82,7 @@ impl LogProbabilities {
         let free = whole - occurring.count() as u32;
         let share = |&(level, occurs): &(u32, bool)| if occurs { 1 + weight(level) * free / sum } else { 0 };
         let mut shares: Vec<u32> = self.0.iter().map(share).collect();
-        // The most frequent symbol takes what rounding leaves, since it costs least there.
+        // The most frequent symbol takes the rest of the rounding, which costs least there.
         let left = whole - shares.iter().sum::<u32>();
         let most = (0..shares.len()).max_by_key(|&k| (shares[k], std::cmp::Reverse(k)))?;
         shares[most] += left;

@@ -1,4 +1,4 @@
-//! Entropy coding: rANS in lanes for symbols with tables of probabilities, and adaptive bits for what is written once a file.
+//! Entropy coding: rANS in lanes for symbols with tables of probabilities, and adaptive bits for data that a file has once.
 
 #![expect(clippy::cast_possible_truncation, reason = "states, words and frequencies are within limits")]
 #![expect(

@@ -35,7 +35,7 @@ const MOST_LOG_SCALE: f32 = 0.8;
 ///
 /// # Errors
 /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-pub(crate) fn alone(
+pub(crate) fn interim_changes(
     mut splats: Splats,
     cameras: &[Camera],
     targets: &[Image],
@@ -154,7 +154,7 @@ mod tests {
         };
         let fitting = views.fitting(&splats);
         let originals = drawn(&splats, &fitting);
-        let changes = alone(grown.clone(), &fitting, &originals, &Silent).unwrap();
+        let changes = interim_changes(grown.clone(), &fitting, &originals, &Silent).unwrap();
         assert!(changes.iter().any(|change| change.log_scale != 0.0));
         let mut fitted = grown.clone();
         for (i, change) in changes.iter().enumerate() {
