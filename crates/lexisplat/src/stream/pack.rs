@@ -44,7 +44,7 @@ impl PackedFile {
 /// over all buckets. Without an observer, the sensitivity is guessed from each Gaussian alone.
 ///
 /// The bytes are the same on any number of threads. They are also those that other processes make of the same tiles, which
-/// are the [parts](SplatSource::parts) of `source`. Peak of anonymous memory is below 1.5 GiB at SH degree 3.
+/// are the [parts](SplatSource::tiles) of `source`. Peak of anonymous memory is below 1.5 GiB at SH degree 3.
 ///
 /// # Errors
 /// [`Error::Parameter`] if options are out of range, if values are so large that sums of them leave f32, or if a
