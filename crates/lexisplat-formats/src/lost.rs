@@ -26,8 +26,8 @@ pub struct Lost {
 }
 
 impl Lost {
-    /// Returns the properties of `splats` that a file of `degree` without extras and normals lacks. `antialiased` tells whether the file
-    /// keeps the mark of anti-aliasing.
+    /// Returns the properties of `splats` that a file of `degree` without extras and normals lacks. `antialiased` tells
+    /// whether the file keeps the mark of anti-aliasing.
     pub(crate) fn beside(splats: &Splats, degree: ShDegree, antialiased: bool) -> Self {
         Self {
             sh_degree: (degree < splats.degree).then(|| [splats.degree.get(), degree.get()]),

@@ -43,13 +43,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`compress()`] learns a dictionary ([`mod@learn`]) and codes every Gaussian with it ([`pursuit`]). [`ply`] and [`lexi`] read
-//! and write files. [`Splats`] is the scene of a PLY, and [`Model`] that of a .lexi. docs/METHOD.md has the mathematics,
-//! docs/FORMAT.md the file.
+//! [`compress()`] learns a dictionary ([`mod@learn`]) and codes every Gaussian with it ([`pursuit`]). [`ply`] and
+//! [`lexi`] read and write files. [`Splats`] is the scene of a PLY, and [`Model`] that of a .lexi. docs/METHOD.md has the
+//! mathematics, docs/FORMAT.md the file.
 //!
-//! The features `encode`, `parallel` and `mmap` are on by default. Without `encode` the crate reads every file, and neither learns
-//! nor packs. Without the other two it needs neither threads nor files, and builds for `wasm32-unknown-unknown`. Results are the
-//! same bit for bit.
+//! The features `encode`, `parallel` and `mmap` are on by default. Without `encode` the crate reads every file, and
+//! neither learns nor packs. Without the other two it needs neither threads nor files, and builds for
+//! `wasm32-unknown-unknown`. Results are the same bit for bit.
 
 #![cfg_attr(
     not(feature = "encode"),

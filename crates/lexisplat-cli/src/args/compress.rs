@@ -66,8 +66,8 @@ pub(crate) struct Compress {
     /// packed files have an order of their own.
     #[arg(long)]
     pub(crate) keep_order: bool,
-    /// Add levels of detail to a large scene: layers of fewer Gaussians, from which readers draw distant parts. A scene of 20
-    /// million Gaussians has 5 layers instead of 2. Each layer takes 0.15 to 0.25 % more bytes.
+    /// Add levels of detail to a large scene: layers of fewer Gaussians, from which readers draw distant parts. A scene
+    /// of 20 million Gaussians has 5 layers instead of 2. Each layer takes 0.15 to 0.25 % more bytes.
     #[arg(long)]
     pub(crate) lod: bool,
     /// Keep all Gaussians. Without this option packing leaves out Gaussians whose effect on the pictures is not worth

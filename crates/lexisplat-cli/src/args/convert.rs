@@ -17,10 +17,10 @@ const FORMATS: &str = "Options of formats";
 /// Convert a scene to another format. Several scenes are merged into one.
 ///
 /// Reads and writes PLY, .lexi, SPZ, SOG, compressed.ply, .splat and glb, and reads .ksplat and .gltf. The format of an
-/// input is told by its content. Properties that the output format cannot hold are left out and listed. A .lexi output is made as
-/// by `lexisplat compress` without options; `lexisplat compress` reads all of these formats itself. docs/FORMATS.md
-/// describes the axes and the precision of each format. Example: `lexisplat convert a.spz b.ply scene.spz` merges two
-/// scenes into scene.spz.
+/// input is told by its content. Properties that the output format cannot hold are left out and listed. A .lexi output is
+/// made as by `lexisplat compress` without options; `lexisplat compress` reads all of these formats itself.
+/// docs/FORMATS.md describes the axes and the precision of each format. Example: `lexisplat convert a.spz b.ply
+/// scene.spz` merges two scenes into scene.spz.
 #[derive(Debug, Args)]
 pub(crate) struct Convert {
     /// One or more scenes to read, then the file to write.

@@ -78,8 +78,8 @@ impl<'a> Scene<'a> {
         self.primitives.iter().all(|one| matches!(&one.splats, Splats::Packed(packed) if packed.antialiased))
     }
 
-    /// Subtracts the translation of the first primitive from all primitives and returns it, if single precision is too coarse at
-    /// this distance from the origin for the sizes of the first Gaussians.
+    /// Subtracts the translation of the first primitive from all primitives and returns it, if single precision is too
+    /// coarse at this distance from the origin for the sizes of the first Gaussians.
     pub(super) fn settle_offset(&mut self) -> Option<Offset> {
         let translation = self.primitives.first()?.place.translation();
         let offset = Offset::new(translation).ok()??;

@@ -44,8 +44,8 @@ impl Splats {
     }
 }
 
-/// Makes the positions of both scenes relative to one offset ([`Offset::shared`]). Returns the larger
-/// of the two roundings.
+/// Makes the positions of both scenes relative to one offset ([`Offset::shared`]). Returns the larger of the two
+/// roundings.
 pub fn unite(a: &mut Splats, b: &mut Splats) -> Rounding {
     let shared = Offset::shared(&[(a.meta.offset, a.len() as u64), (b.meta.offset, b.len() as u64)]);
     let (a, b) = (a.rebase(shared), b.rebase(shared));

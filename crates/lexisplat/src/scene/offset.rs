@@ -85,8 +85,8 @@ impl fmt::Display for Offset {
     }
 }
 
-/// Makes positions that are relative to `from` relative to `to`. Returns the largest move of a
-/// position by rounding, along an axis.
+/// Makes positions that are relative to `from` relative to `to`. Returns the largest move of a position by rounding,
+/// along an axis.
 pub(crate) fn shift(positions: &mut [[f32; 3]], from: Option<Offset>, to: Option<Offset>) -> f64 {
     if from == to {
         return 0.0;

@@ -54,8 +54,8 @@ const LEAST_TOTAL: f64 = 1e-30;
 /// Share of the 90th percentile of sensitivities. A sensitivity that is not above this share counts as not seen.
 const UNSEEN: f32 = 1e-4;
 
-/// Smallest sensitivity to a Gaussian, as a share of the guessed sensitivity. Steps are then at most 2.6 times as large as with the
-/// guess. From any viewpoint, a file is therefore not much worse than a file made with the guess.
+/// Smallest sensitivity to a Gaussian, as a share of the guessed sensitivity. Steps are then at most 2.6 times as large
+/// as with the guess. From any viewpoint, a file is therefore not much worse than a file made with the guess.
 const LEAST_OF_GUESS: f32 = 0.15;
 
 impl Sensitivity {
@@ -146,9 +146,9 @@ impl Sensitivity {
         whole.chain(shapes).for_each(|v| *v *= factor);
     }
 
-    /// Estimates the sensitivity from the Gaussians alone. It is largest for opaque and large Gaussians. The estimate does not
-    /// know which Gaussians hide others, so files made with it are larger than files of the same quality made with a
-    /// measured sensitivity.
+    /// Estimates the sensitivity from the Gaussians alone. It is largest for opaque and large Gaussians. The estimate
+    /// does not know which Gaussians hide others, so files made with it are larger than files of the same quality made
+    /// with a measured sensitivity.
     #[must_use]
     pub fn guess(geometry: &Geometry) -> Self {
         Self::guess_of_part(geometry, guessed_total(0.0, geometry))

@@ -13,10 +13,10 @@ use crate::support::error::{Error, Result};
 /// compressed.ply) write infinities for 255 and 0.
 pub const SURE_OPACITY: f32 = 100.0;
 
-/// Value that replaces a scale of minus infinity, the logarithm of a size of zero, which converters of 2D Gaussians write.
-/// e^-20 is 2e-9 units. No picture shows so small a size, since the rasteriser blurs by 0.3 squared pixels. It is the
-/// smallest logarithm that the compressed PLY of `PlayCanvas` holds (`compressed-chunk.ts`). It does not depend on the scene,
-/// so parts of a scene have the same values as the whole.
+/// Value that replaces a scale of minus infinity, the logarithm of a size of zero, which converters of 2D Gaussians
+/// write. e^-20 is 2e-9 units. No picture shows so small a size, since the rasteriser blurs by 0.3 squared pixels. It is
+/// the smallest logarithm that the compressed PLY of `PlayCanvas` holds (`compressed-chunk.ts`). It does not depend on
+/// the scene, so parts of a scene have the same values as the whole.
 pub const FLAT_SCALE: f32 = -20.0;
 
 /// Replaces scales of minus infinity by [`FLAT_SCALE`]. Returns the number of Gaussians that have any.

@@ -15,10 +15,10 @@ pub trait Observer<E = Error> {
     /// Those of drawing.
     fn observe(&mut self, part: &Splats) -> Result<Observed, E>;
 
-    /// Returns the base colours and opacities with which pictures of `model` are nearest to those of `part`; `None` leaves
-    /// them as they are. `model` is the part as the file has it. `sensitivities` has the
-    /// sensitivity to the appearance of each Gaussian of `model`. `memo` is the one of [`Observed`]. The function is called
-    /// for each part, if the options let these values change.
+    /// Returns the base colours and opacities with which pictures of `model` are nearest to those of `part`; `None`
+    /// leaves them as they are. `model` is the part as the file has it. `sensitivities` has the sensitivity to the
+    /// appearance of each Gaussian of `model`. `memo` is the one of [`Observed`]. The function is called for each part,
+    /// if the options let these values change.
     ///
     /// # Errors
     /// Those of drawing.

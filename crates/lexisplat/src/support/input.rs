@@ -1,11 +1,11 @@
 //! The bytes of a file, mapped if possible.
 //!
 //! # Why this module may use `unsafe`
-//! Mapping a file is the only way to read a gigabyte without copying it first. `memmap2` can offer it only as an
-//! unsafe function. If another process shortens the file while it is mapped, reading the lost pages raises `SIGBUS`.
-//! (Windows forbids the shortening.) A process cannot exclude this for a file that it does not own.
-//! Changed contents are harmless here, because every reader treats the bytes as untrusted and takes sizes from the
-//! header only once. Callers who cannot accept the risk build without the `mmap` feature, or pass bytes they own.
+//! Mapping a file is the only way to read a gigabyte without copying it first. `memmap2` can offer it only as an unsafe
+//! function. If another process shortens the file while it is mapped, reading the lost pages raises `SIGBUS`. (Windows
+//! forbids the shortening.) A process cannot exclude this for a file that it does not own. Changed contents are harmless
+//! here, because every reader treats the bytes as untrusted and takes sizes from the header only once. Callers who cannot
+//! accept the risk build without the `mmap` feature, or pass bytes they own.
 
 use std::io::{self, Read};
 use std::ops::Deref;

@@ -21,7 +21,8 @@ const PROPERTIES: u64 = 4096;
 ///
 /// A reader allocates at most a constant times the file's own size, because it first compares the counts of the header
 /// with the bytes present. The constant is small except for packed files, where a byte may stand for 3 Gaussians of some
-/// hundred bytes. These limits hold in addition. By default every valid file is within them. For files of unknown origin, lower [`Self::gaussians`] or [`Self::bytes`]:
+/// hundred bytes. These limits hold in addition. By default every valid file is within them. For files of unknown origin,
+/// lower [`Self::gaussians`] or [`Self::bytes`]:
 ///
 /// ```
 /// use lexisplat::{Error, Limits, lexi};

@@ -21,8 +21,8 @@ use crate::support::progress::{Progress, Silent, Stage};
 /// Number of rows that are read together when a file is opened.
 const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
 
-/// A PLY whose Gaussians are read a part at a time. Its errors, its omissions and its warnings are
-/// those of [`read_bytes`](super::read_bytes), but no array is as long as the scene.
+/// A PLY whose Gaussians are read a part at a time. Its errors, its omissions and its warnings are those of
+/// [`read_bytes`](super::read_bytes), but no array is as long as the scene.
 #[derive(Debug)]
 pub struct PlySource<'a> {
     file: PlyFile<'a>,

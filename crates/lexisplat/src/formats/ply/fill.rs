@@ -28,8 +28,8 @@ pub(super) fn empty(layout: &Layout) -> Splats {
 
 /// Resizes all arrays but the normals to `count` Gaussians. Their contents have no meaning afterwards.
 ///
-/// The caller has checked that the file holds `count` rows. Every property takes at least a byte of a row, so the arrays take
-/// at most four times the bytes of the file.
+/// The caller has checked that the file holds `count` rows. Every property takes at least a byte of a row, so the arrays
+/// take at most four times the bytes of the file.
 fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Result<()> {
     /// New memory is zeroed by the system. The threads that fill it are the first to touch it.
     fn sized<T: Copy>(values: &mut Vec<T>, len: usize, zero: T) {

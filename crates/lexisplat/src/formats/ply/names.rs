@@ -17,8 +17,8 @@ pub(super) const ROTATION: [&str; 4] = ["rot_0", "rot_1", "rot_2", "rot_3"];
 /// Name of the element that holds Gaussians.
 pub(super) const VERTEX: &str = "vertex";
 
-/// Returns whether a property that 3DGS does not define can have this name. A name with a line break could add lines to a header.
-/// It can have the name of a normal, since a scene need not have normals.
+/// Returns whether a property that 3DGS does not define can have this name. A name with a line break could add lines to a
+/// header. It can have the name of a normal, since a scene need not have normals.
 pub(crate) fn is_extra_name(name: &str) -> bool {
     let fixed = [&POSITION[..], &DC, &OPACITY, &SCALE, &ROTATION].concat();
     let digits = name.strip_prefix(REST_PREFIX).filter(|digits| !digits.is_empty());

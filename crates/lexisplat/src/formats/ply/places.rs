@@ -95,9 +95,9 @@ impl Places {
         if farthest < f64::from(f32::MAX) { farthest * HALF_STEP } else { f64::INFINITY }
     }
 
-    /// Returns the median of the sample along each axis, rounded to a multiple of a power of two near half the extent of most
-    /// of the sample. It has few digits, and subtracting it from a position is exact. A few Gaussians far away hardly change
-    /// it.
+    /// Returns the median of the sample along each axis, rounded to a multiple of a power of two near half the extent of
+    /// most of the sample. It has few digits, and subtracting it from a position is exact. A few Gaussians far away
+    /// hardly change it.
     fn offset(&self) -> Option<Offset> {
         let along = [0, 1, 2].map(|axis| {
             let mut along: Vec<f64> = self.sample.iter().map(|place| place.0[axis]).collect();

@@ -43,7 +43,8 @@ pub(in crate::packed) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<I
 
 /// A receiver of the decoded Gaussians of a chunk. It is a trait, since closures are not inlined into vector code.
 pub(in crate::packed) trait Sink {
-    /// Takes Gaussian `number` of each lane in `set`. It has the index `in_block` in its block. Returns the rule that a damaged file breaks.
+    /// Takes Gaussian `number` of each lane in `set`. It has the index `in_block` in its block. Returns the rule that a
+    /// damaged file breaks.
     fn group(
         &mut self,
         number: usize,

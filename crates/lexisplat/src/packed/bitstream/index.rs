@@ -67,8 +67,8 @@ pub(in crate::packed) struct Index {
     pub(in crate::packed) order: Vec<Place>,
 }
 
-/// Returns the form of each layer. `refinements` holds the number of refinements of each. All layers but the last have interim
-/// changes if `interim` is true.
+/// Returns the form of each layer. `refinements` holds the number of refinements of each. All layers but the last have
+/// interim changes if `interim` is true.
 pub(in crate::packed) fn layer_forms(refinements: &[u8], sh_parts: usize, interim: bool) -> Vec<LayerForm> {
     let last = refinements.len().saturating_sub(1);
     let form = |(k, &refinements): (usize, &u8)| LayerForm {

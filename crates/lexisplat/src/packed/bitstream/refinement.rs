@@ -18,7 +18,8 @@ const CLASSES: u32 = 8;
 const CLASS_WIDTH: u32 = 2;
 const FINENESS_WIDTH: u32 = 3;
 
-/// Codes the refinement of a group from `missing` missing refinements to one fewer. Returns the rule that a damaged file breaks.
+/// Codes the refinement of a group from `missing` missing refinements to one fewer. Returns the rule that a damaged file
+/// breaks.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(in crate::packed) fn refine<S: Symbols>(

@@ -132,8 +132,8 @@ impl Rest {
         (nonzeros, rows)
     }
 
-    /// Returns the SH-rest of Gaussian `i` of lane `l` in SH part `sh_part`. Gaussians must come in order. An SH part that was not
-    /// coded has no nonzeros.
+    /// Returns the SH-rest of Gaussian `i` of lane `l` in SH part `sh_part`. Gaussians must come in order. An SH part
+    /// that was not coded has no nonzeros.
     #[inline(always)]
     pub(in crate::packed) fn coded(
         &self,
@@ -154,7 +154,8 @@ impl Rest {
         Coded::Code { first, count }
     }
 
-    /// Returns `count` nonzeros of lane `l` in SH part `sh_part`, from index `from` on: pairs of an atom and a value in steps.
+    /// Returns `count` nonzeros of lane `l` in SH part `sh_part`, from index `from` on: pairs of an atom and a value in
+    /// steps.
     #[inline(always)]
     pub(in crate::packed) fn nonzeros(
         &self,

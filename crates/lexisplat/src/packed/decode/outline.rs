@@ -82,8 +82,8 @@ pub enum RangeKind {
     Base,
     /// A refinement of the base, by its number from 0. It needs all refinements of lower numbers.
     Refinement(usize),
-    /// An SH part: the nonzeros of some sizes, by its number from 0. Part 0 has the largest values. A part needs all parts of
-    /// lower numbers.
+    /// An SH part: the nonzeros of some sizes, by its number from 0. Part 0 has the largest values. A part needs all
+    /// parts of lower numbers.
     Sh(usize),
     /// Interim changes: changes of Gaussians while those of the next layer are missing.
     Interim,

@@ -1,7 +1,7 @@
 //! The floor: the coarsest steps that a visible Gaussian may have at any sensitivity.
 //!
-//! Other views may show Gaussians that the measured views hardly show. The limits are shares of a Gaussian's own size, turn, opacity and
-//! colour, so that another view may look worse but not broken (docs/METHOD.md, "The floor").
+//! Other views may show Gaussians that the measured views hardly show. The limits are shares of a Gaussian's own size,
+//! turn, opacity and colour, so that another view may look worse but not broken (docs/METHOD.md, "The floor").
 
 use serde::{Deserialize, Serialize};
 
@@ -118,8 +118,7 @@ fn rescale(parameters: &mut Parameters, octaves: ColourAndShape<f32>) {
     parameters.base.shape *= exp2(-octaves.shape);
 }
 
-/// Returns the coarsest classes that a Gaussian may have. A class is below 0 if class 0 is too
-/// coarse.
+/// Returns the coarsest classes that a Gaussian may have. A class is below 0 if class 0 is too coarse.
 fn coarsest(parameters: &Parameters, geometry: &Geometry, placed: MortonKey) -> ColourAndShape<f32> {
     let g = canonical(geometry, placed.index());
     if g.log_opacity < VISIBLE {

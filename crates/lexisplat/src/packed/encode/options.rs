@@ -34,9 +34,10 @@ pub struct PackOptions {
     /// Least number of Gaussians of a scene with two layers. The first layer draws the whole scene coarsely. Smaller scenes
     /// have one layer. Default 8,000; `usize::MAX` for one layer always.
     pub layers_from: usize,
-    /// Most Gaussians of the first layer, with levels of detail. A scene then has more layers, each of about five times as
-    /// many Gaussians as the layers before it, so that readers draw distant Gaussians from few layers
-    /// ([`Outline::select`](crate::packed::Outline::select)). docs/results/lod.md has their bytes. Default `None`: two layers.
+    /// Most Gaussians of the first layer, with levels of detail. A scene then has more layers, each of about five times
+    /// as many Gaussians as the layers before it, so that readers draw distant Gaussians from few layers
+    /// ([`Outline::select`](crate::packed::Outline::select)). docs/results/lod.md has their bytes. Default `None`: two
+    /// layers.
     pub lod: Option<usize>,
 }
 

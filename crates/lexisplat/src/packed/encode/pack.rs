@@ -46,8 +46,8 @@ impl<S: Borrow<Splats>> Packer<S> {
     /// Prepares `splats`. `sensitivity` says how much pictures depend on each value of each Gaussian.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values or
-    /// sensitivities that are not finite.
+    /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values or sensitivities that are
+    /// not finite.
     pub fn new(splats: S, sensitivity: &Sensitivity, options: &PackOptions) -> Result<Self> {
         check(splats.borrow(), sensitivity)?;
         options.check()?;

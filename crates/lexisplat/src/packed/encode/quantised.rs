@@ -29,9 +29,8 @@ use crate::support::stopwatch::Stopwatch;
 
 /// A function that fits the base colours and opacities of a part of a scene to pictures of the part.
 ///
-/// Its arguments are the part, the model that the file has of it, and the sensitivity to the appearance of each Gaussian of
-/// the model. It returns one appearance for each Gaussian of the model, or `None` to
-/// leave them as they are.
+/// Its arguments are the part, the model that the file has of it, and the sensitivity to the appearance of each Gaussian
+/// of the model. It returns one appearance for each Gaussian of the model, or `None` to leave them as they are.
 pub type Refit<'a, E = Error> =
     dyn FnMut(&Splats, &Model, &[AppearanceSensitivity]) -> Result<Option<Vec<Appearance>>, E> + 'a;
 
@@ -241,8 +240,8 @@ impl<'a> Quantised<'a> {
         Ok(OrderedGaussians { appearances, ..OrderedGaussians::new(self.splats, keys, classes) })
     }
 
-    /// Calls `with` for each chunk of `ordered`, with its layer, the counts of its codes and its symbols. Returns the results
-    /// in the order of chunks.
+    /// Calls `with` for each chunk of `ordered`, with its layer, the counts of its codes and its symbols. Returns the
+    /// results in the order of chunks.
     fn each_chunk<T: Send>(
         &self,
         ordered: OrderedGaussians<'_>,
@@ -258,8 +257,8 @@ impl<'a> Quantised<'a> {
         })
     }
 
-    /// Calls `with` for each chunk of `ordered`, with its layer, the counts of its codes and its targets. Returns the results
-    /// in the order of chunks.
+    /// Calls `with` for each chunk of `ordered`, with its layer, the counts of its codes and its targets. Returns the
+    /// results in the order of chunks.
     pub(in crate::packed) fn each_target<T: Send>(
         &self,
         ordered: OrderedGaussians<'_>,

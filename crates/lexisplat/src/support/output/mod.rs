@@ -69,8 +69,8 @@ impl Output<'_> {
     }
 }
 
-/// Writes a file with `write` and returns the result of `write`. The file appears under its name only when it is whole and on
-/// the disk.
+/// Writes a file with `write` and returns the result of `write`. The file appears under its name only when it is whole
+/// and on the disk.
 ///
 /// An existing file is replaced in one step, or is an error; see [`Existing`]. An error leaves nothing behind. A pipe
 /// or a device such as `/dev/null` is written to directly.
@@ -130,8 +130,8 @@ fn keep_mode(file: &File, target: &Path) -> io::Result<()> {
     kept
 }
 
-/// Asks the system to store the new name on the disk too. Some file systems cannot. Errors are
-/// ignored, because the file is whole in any case.
+/// Asks the system to store the new name on the disk too. Some file systems cannot. Errors are ignored, because the file
+/// is whole in any case.
 fn sync_folder(folder: &Path) {
     if cfg!(unix)
         && let Ok(folder) = File::open(folder)

@@ -14,13 +14,14 @@ use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity};
 use crate::stream::Observed;
 use crate::support::error::{Error, Result};
 
-/// Sum of the squared sensitivities that views measure. A guess scales its sensitivities to a sum of 1, but the sum of squares is
-/// smaller where several Gaussians share a pixel or none covers it. Without this factor, files came out 7 to 9 dB better
-/// than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
+/// Sum of the squared sensitivities that views measure. A guess scales its sensitivities to a sum of 1, but the sum of
+/// squares is smaller where several Gaussians share a pixel or none covers it. Without this factor, files came out 7 to 9
+/// dB better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
 pub(crate) const SHOWN: f64 = 0.1;
 
-/// The memory of a measured bucket. It holds the sensitivities of each Gaussian, rounded to eighths of an octave, and whether
-/// the Gaussian stays. It also holds the factor from the observer's sensitivities to these, and the observer's memo.
+/// The memory of a measured bucket. It holds the sensitivities of each Gaussian, rounded to eighths of an octave, and
+/// whether the Gaussian stays. It also holds the factor from the observer's sensitivities to these, and the observer's
+/// memo.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Looked {
     plan_id: u32,

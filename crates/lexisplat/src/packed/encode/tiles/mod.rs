@@ -20,8 +20,8 @@
 //! | [`Assembly`] | file | all of these | the file |
 //!
 //! Statistics are sums. They are added in the order of blocks, buckets and groups, which need not be the order in which
-//! they were computed. So one process, many threads and many machines make the same bytes. Every type that passes between steps has `to_bytes` and
-//! `from_bytes`. [`stream::pack`](crate::stream::pack) takes all steps in one process.
+//! they were computed. So one process, many threads and many machines make the same bytes. Every type that passes between
+//! steps has `to_bytes` and `from_bytes`. [`stream::pack`](crate::stream::pack) takes all steps in one process.
 
 mod assembly;
 mod bucket;
