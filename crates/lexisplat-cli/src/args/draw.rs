@@ -64,7 +64,8 @@ pub(crate) struct View {
     pub(crate) files: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) views: Views,
-    /// Actions for tests and recordings, such as `camera=3,mode=wipe,screenshot=a.png,quit`. `--help` lists the words.
+    /// Actions for tests and recordings, such as `camera=3,mode=wipe,screenshot=a.png,quit`. The end of `lexisplat view
+    /// --help` lists the words.
     #[arg(long, value_name = "WORDS", default_value = "", hide_default_value = true)]
     pub(crate) actions: String,
 }
