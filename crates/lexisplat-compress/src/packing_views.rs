@@ -271,7 +271,7 @@ impl PackingViews {
     /// Returns up to `most` points that represent the positions of the views that judge. Starting points are chosen far
     /// from each other. Each position belongs to the nearest starting point. The result has the middle position of each
     /// group.
-    pub(crate) fn viewpoints(&self, most: usize) -> Vec<[f32; 3]> {
+    pub(crate) fn points_of_view(&self, most: usize) -> Vec<[f32; 3]> {
         let mut positions: Vec<[f32; 3]> = self.judging.iter().map(|camera| camera.position).collect();
         let squared = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>();
         let to_nearest = |of: [f32; 3], points: &[[f32; 3]]| {

@@ -30,7 +30,7 @@ pub struct PackOptions {
     pub seed: u64,
     /// Up to 15 points from which the scene is seen. The file then holds the base colours that are seen from these points
     /// on average, so that colours are right without SH-rest too.
-    pub viewpoints: Vec<[f32; 3]>,
+    pub points_of_view: Vec<[f32; 3]>,
     /// Least number of Gaussians of a scene with two layers. The first layer draws the whole scene coarsely. Smaller scenes
     /// have one layer. Default 8,000; `usize::MAX` for one layer always.
     pub layers_from: usize,
@@ -49,7 +49,7 @@ impl Default for PackOptions {
             keep_order: false,
             keep_all: false,
             seed: 0,
-            viewpoints: Vec::new(),
+            points_of_view: Vec::new(),
             layers_from: LEAST_LAYERED,
             lod: None,
         }
@@ -63,7 +63,7 @@ impl PackOptions {
         with_keep_order(keep_order: bool),
         with_keep_all(keep_all: bool),
         with_seed(seed: u64),
-        with_viewpoints(viewpoints: Vec<[f32; 3]>),
+        with_points_of_view(points_of_view: Vec<[f32; 3]>),
         with_layers_from(layers_from: usize),
         with_lod(lod: impl Into<Option<usize>>),
     );
@@ -87,7 +87,7 @@ impl PackOptions {
         if self.lod == Some(0) {
             return Err(Error::parameter("lod", 0, "at least 1 Gaussian in the first layer"));
         }
-        all_finite([("viewpoints", self.viewpoints.as_flattened())])?;
+        all_finite([("points_of_view", self.points_of_view.as_flattened())])?;
         if let Some(tol) = self.tolerance
             && (!tol.is_finite() || tol <= 0.0)
         {

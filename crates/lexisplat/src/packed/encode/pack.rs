@@ -55,7 +55,7 @@ impl<S: Borrow<Splats>> Packer<S> {
         let grid = Grid::fit(&g.positions);
         let mut keys = grid.keys(g);
         keys.sort_unstable();
-        let points_of_view = PointsOfView::new(&options.viewpoints);
+        let points_of_view = PointsOfView::new(&options.points_of_view);
         let dc = points_of_view.colours(splats.borrow());
         let fit = Fit::new(g, &dc, sensitivity, &keys, &grid);
         let influence = Influence::new(g, sensitivity, &keys, options.may_change());

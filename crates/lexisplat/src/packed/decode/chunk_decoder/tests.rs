@@ -8,14 +8,14 @@ use crate::scene::splats::Geometry;
 use crate::{Sensitivity, Silent};
 
 /// Returns a packed scene of two layers. With `row`, every 100th SH-rest row has this value in all of its coefficients.
-fn packed(row: Option<f32>, viewpoints: Vec<[f32; 3]>) -> Packed {
+fn packed(row: Option<f32>, points_of_view: Vec<[f32; 3]>) -> Packed {
     let mut splats = crate::support::testing::scene(9000, 11);
     let dim = splats.degree.rest();
     if let Some(value) = row {
         splats.sh_rest.chunks_exact_mut(dim).step_by(100).for_each(|row| row.fill(value));
     }
     let mut options = PackOptions::default();
-    (options.atoms, options.viewpoints) = (Some(20), viewpoints);
+    (options.atoms, options.points_of_view) = (Some(20), points_of_view);
     let sensitivity = Sensitivity::guess(&splats.geometry);
     Packer::new(&splats, &sensitivity, &options).unwrap().pack(1e-5, &Silent).unwrap().0
 }

@@ -115,7 +115,7 @@ impl Coding {
     pub(super) fn encoding(&self, plan: &Plan) -> Result<Encoding> {
         plan.check("coding", [self.plan_id], None)?;
         let clock = Stopwatch::start();
-        let points_of_view = PointsOfView::new(&plan.options.viewpoints);
+        let points_of_view = PointsOfView::new(&plan.options.points_of_view);
         let (floor, stop) = (&self.floor, self.steps.stop);
         let mut parameters = floor.parameters.clone();
         parameters.factors[VALUES] *= self.value_step;

@@ -107,7 +107,7 @@ impl LookStatistics {
                 out.energies.add(opacity);
             }
         }
-        out.colours.add(&PointsOfView::new(&plan.options.viewpoints).colours(splats));
+        out.colours.add(&PointsOfView::new(&plan.options.points_of_view).colours(splats));
         out.derivatives.add(&splats.geometry, found, &bucket.keys());
         (out, looked)
     }

@@ -101,7 +101,7 @@ impl Sample {
     pub fn statistics(&self, plan: &Plan, steps: &Steps) -> Result<SampleStatistics> {
         plan.check("steps", [steps.plan_id], None)?;
         let mut out = SampleStatistics::none(plan);
-        let points_of_view = PointsOfView::new(&plan.options.viewpoints);
+        let points_of_view = PointsOfView::new(&plan.options.points_of_view);
         let parameters = &steps.floor.parameters;
         for bucket in &self.buckets {
             let dc = points_of_view.colours(&bucket.splats);
