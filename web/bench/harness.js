@@ -15,14 +15,14 @@ async function start(workers = 2) {
 }
 
 /** Loads a scene whole, and tells when its parts came. */
-async function load(url, slot = 0, budget = Infinity) {
+async function load(url, slot = 0, memory = Infinity) {
   const began = performance.now();
   const events = [];
   let last;
   const { info } = await show(url, {
     env,
     slot,
-    budget,
+    memory,
     onForm: (bytes, info) => viewer.form(slot, bytes, JSON.stringify(info)),
     onPart: (index, bytes) => viewer.part(slot, index, bytes),
     onProgress: (progress) => {
@@ -33,10 +33,52 @@ async function load(url, slot = 0, budget = Infinity) {
   return { info, milliseconds: performance.now() - began, progress: last, events, report: JSON.parse(viewer.report()) };
 }
 
-/** The picture of the present view at a size, as base64 of RGBA. */
-async function picture(width, height, words = '') {
+let stream;
+let last = Promise.resolve();
+
+/** Calls `change` when the calls before are done, since those of a viewer may not overlap. */
+function act(change) {
+  last = last.then(change);
+  return last;
+}
+
+/** Begins a scene of which a part is drawn within `budget`. Resolves when some of its first layer is there. */
+async function begin(url, budget) {
+  let isBegun;
+  const begun = new Promise((resolve) => (isBegun = resolve));
+  const change = async ({ removed, parts }) => {
+    removed.forEach((index) => viewer.remove_part(0, index));
+    for (const { index, part } of parts) await viewer.part(0, index, part);
+    isBegun();
+  };
+  const shown = show(url, {
+    env,
+    budget,
+    onForm: (bytes, info) => act(() => viewer.form(0, bytes, JSON.stringify(info))),
+    onChange: (changes) => act(() => change(changes)),
+    onStream: (begun) => (stream = begun),
+  });
+  await Promise.race([shown, begun]);
+}
+
+/** Goes to the next camera and waits until all that it shows is there. Returns what came, and from where it is seen. */
+async function fly() {
+  const began = performance.now();
+  stream.look(await act(() => (viewer.key(']'), JSON.parse(viewer.report()).eye)));
+  await stream.settled();
+  const milliseconds = performance.now() - began;
+  const report = await act(() => JSON.parse(viewer.report()));
+  return { milliseconds, camera: report.camera, gaussians: report.gaussians[0], resident: report.resident_bytes, ...stream.state };
+}
+
+function resize(width, height) {
   [canvas.width, canvas.height] = [width, height];
   viewer.resize(width, height);
+}
+
+/** The picture of the present view at a size, as base64 of RGBA. */
+async function picture(width, height, words = '') {
+  resize(width, height);
   if (words) viewer.run(words);
   await viewer.draw(1);
   const { width: w, height: h, data } = await viewer.picture();
@@ -50,8 +92,9 @@ function base64(bytes) {
 }
 
 async function cameras(url) {
-  viewer.cameras(new Uint8Array(await (await fetch(url)).arrayBuffer()));
+  const bytes = new Uint8Array(await (await fetch(url)).arrayBuffer());
+  await act(() => viewer.cameras(bytes));
 }
 
-window.bench = { start, load, picture, cameras, viewer: () => viewer, show, env: () => env };
+window.bench = { start, load, begin, fly, resize, picture, cameras, viewer: () => viewer, show, env: () => env };
 document.title = 'ready';

@@ -1,10 +1,14 @@
-/** Brings a scene of any format to the viewer: .lexi files coarse to fine while they come, others whole. */
+/**
+ * Brings a scene of any format to the viewer: .lexi files coarse to fine while they come, and large ones as far as a view
+ * shows them within a budget; others whole.
+ */
 
 import * as wasm from '../wasm/viewer.js';
 import { ALL_PARTS, MEMORY, PACKED, readStart, readWhole, startDecoders, startFeed } from './open.js';
 import { Pool } from './pool.js';
 import { streamed } from './scene.js';
 import { sourceOf, watched } from './source.js';
+import { Stream } from './stream.js';
 import { viewerHandlerOf } from './viewer-handler.js';
 
 /** Bytes of a Gaussian on the GPU, besides its nonzeros: position and size, shape, base colour, and its place among codes. */
@@ -14,8 +18,10 @@ const NONZERO = 3;
 const NONZEROS = 8;
 /** Bytes of a coefficient of dense SH, whose rows are filled up to four. */
 const COEFFICIENT = 4;
-/** Of the budget, the share that the scene may take. The rest is for what it is drawn with. */
+/** Of the graphics memory, the share that the scene may take. The rest is for what it is drawn with. */
 const SCENE_SHARE = 0.75;
+/** No limit of what is drawn of a scene. */
+const UNLIMITED = { splats: Infinity, bytes: Infinity };
 
 /**
  * @param {string | URL | Blob | ArrayBuffer | ArrayBufferView} source
@@ -23,17 +29,29 @@ const SCENE_SHARE = 0.75;
  * @param {{wasm: WebAssembly.Module, worker: () => Worker, workers: number}} options.env
  * @param {(bytes: Uint8Array, info: object) => unknown} options.onForm takes what `Viewer.form` takes
  * @param {(index: number, bytes: Uint8Array) => unknown} options.onPart takes what `Viewer.part` takes
+ * @param {(change: {removed: number[], parts: object[]}) => Promise<unknown>} [options.onChange] shows a change of a scene of which
+ *     a part is drawn: removes parts by their numbers, and then takes `part` as number `index` for each of `parts`
+ * @param {(stream: Stream) => void} [options.onStream] takes the stream of such a scene, which goes on until `signal` ends it
+ * @param {(error: unknown) => void} [options.onFail] is told why a stream ended after it was whole
  * @param {(progress: object) => void} [options.onProgress]
  * @param {AbortSignal} [options.signal]
- * @param {number} options.budget most bytes on the GPU
+ * @param {import('./stream.js').Budget} [options.budget] most Gaussians that are drawn, and bytes of a .lexi that are held. Of a
+ *     packed file with more Gaussians, only what a view shows is drawn.
+ * @param {number} [options.memory] most bytes on the GPU
  * @returns {Promise<{info: object}>}
  */
-export async function show(source, { env, onForm, onPart, onProgress, signal, budget = Infinity }) {
+export async function show(source, { env, onProgress, signal, budget = UNLIMITED, memory = Infinity, ...on }) {
   const input = { source: sourceOf(source), feed: undefined };
   let pool;
   const stats = { milliseconds: 0 };
   const report = (progress) => onProgress?.({ ...progress, ms: stats.milliseconds });
   const options = watched(input.source, { memory: MEMORY, shParts: ALL_PARTS, signal, onProgress: report });
+  const close = () => {
+    input.source.close();
+    input.feed?.free();
+    pool?.close();
+  };
+  let stream;
   try {
     signal?.throwIfAborted();
     const start = await readStart(input.source, signal);
@@ -42,23 +60,33 @@ export async function show(source, { env, onForm, onPart, onProgress, signal, bu
       worker: env.worker,
       handler: () => viewerHandlerOf(wasm),
     });
-    const given = { input, start, pool, options, stats, budget, onForm, onPart };
-    return { info: await (start.version === PACKED ? layered(given) : whole(given)) };
+    const given = { input, start, pool, options, stats, memory, ...on };
+    if (start.version !== PACKED) return { info: await whole(given) };
+    const header = await startFeed(input, wasm, start, options);
+    await startDecoders(pool, input, options);
+    const splats = Math.min(budget.splats, mostGaussians(memory));
+    if (header.gaussians <= splats || !(await input.source.hasRanges(signal))) {
+      return { info: await layered({ ...given, header, splats }) };
+    }
+    let info;
+    ({ stream, info } = within({ ...given, header, budget: { ...budget, splats } }));
+    on.onStream?.(stream);
+    let isWhole = false;
+    stream.run().finally(close).catch((error) => isWhole && on.onFail?.(error));
+    await stream.whole;
+    isWhole = true;
+    return { info };
   } finally {
-    input.source.close();
-    input.feed?.free();
-    pool?.close();
+    if (!stream) close();
   }
 }
 
-/** Shows a packed file while it comes. */
-async function layered({ input, start, pool, options, stats, budget, onForm, onPart }) {
-  const header = await startFeed(input, wasm, start, options);
+/** Shows a packed file while it comes, at most `splats` Gaussians. */
+async function layered({ input, pool, options, stats, header, splats, onForm, onPart }) {
   const { name } = input.source;
-  const shown = input.feed.give_up(Math.min(header.gaussians, mostGaussians(budget)));
-  if (shown === 0 && header.gaussians > 0) throw new Error(`${name}: ${budget} bytes of graphics memory are too few for it`);
+  const shown = input.feed.give_up(Math.min(header.gaussians, splats));
+  if (shown === 0 && header.gaussians > 0) throw new Error(`${name}: its first chunk has more than the ${splats} Gaussians that there is room for`);
   const info = { ...header, name, shown };
-  await startDecoders(pool, input, options);
   let isFormed = false;
   for await (const chunk of streamed({ ...input, pool, options, as: 'gpu', refine: true, stats })) {
     if (!isFormed) await onForm(chunk.form, info);
@@ -68,12 +96,48 @@ async function layered({ input, start, pool, options, stats, budget, onForm, onP
   return info;
 }
 
-function mostGaussians(budget) {
-  return Math.floor((budget * SCENE_SHARE) / (GEOMETRY + NONZERO * NONZEROS));
+/** Begins to show what a view shows of a packed file. */
+function within({ input, pool, options, stats, header, budget, onForm, onChange }) {
+  const { source, feed } = input;
+  // The stream takes what came to the feed.
+  const core = new wasm.Stream(feed);
+  input.feed = undefined;
+  let isFormed = false;
+  const change = async ({ removed, parts }) => {
+    if (!isFormed && parts.length > 0) await onForm(parts[0].form, info);
+    isFormed ||= parts.length > 0;
+    await onChange({ removed, parts });
+  };
+  let isWhole = false;
+  const progress = () => {
+    if (isWhole) return;
+    const { bytes, held, drawn, splats } = stream.state;
+    options.onProgress?.({ loaded: Math.min(bytes, held), total: bytes, decoded: drawn, gaussians: splats });
+  };
+  const stream = new Stream({ source, core, pool: timed(pool, stats), budget, signal: options.signal }, { change, progress });
+  stream.whole.then(() => (isWhole = true)).catch(() => {});
+  const info = { ...header, name: source.name, shown: stream.state.splats, budget: budget.splats };
+  return { stream, info };
+}
+
+/** `pool`, whose answers' milliseconds are added up. */
+function timed(pool, stats) {
+  return {
+    async ask(...message) {
+      const clock = performance.now();
+      const answer = await pool.ask(...message);
+      stats.milliseconds += performance.now() - clock;
+      return answer;
+    },
+  };
+}
+
+function mostGaussians(memory) {
+  return Math.floor((memory * SCENE_SHARE) / (GEOMETRY + NONZERO * NONZEROS));
 }
 
 /** Shows a file that is read whole. */
-async function whole({ input: { source }, start, pool, options, stats, budget, onForm, onPart }) {
+async function whole({ input: { source }, start, pool, options, stats, memory, onForm, onPart }) {
   const { name } = source;
   const bytes = await readWhole(source, start.bytes, { ...options, memory: Infinity });
   const loaded = bytes.length;
@@ -88,8 +152,8 @@ async function whole({ input: { source }, start, pool, options, stats, budget, o
     if (form) {
       info = { ...head, name, shown: head.gaussians };
       const needed = head.gaussians * (GEOMETRY + COEFFICIENT * 4 * Math.ceil((3 * (head.degree + 1) ** 2) / 4));
-      if (needed > budget * SCENE_SHARE) {
-        throw new Error(`${name}: it takes ${needed} bytes of graphics memory as it is, and ${budget} are allowed; a .lexi made of it takes less`);
+      if (needed > memory * SCENE_SHARE) {
+        throw new Error(`${name}: it takes ${needed} bytes of graphics memory as it is, and ${memory} are allowed; a .lexi made of it takes less`);
       }
       take(() => onForm(form, info));
     } else {

@@ -2,7 +2,7 @@
  * Where the bytes of a file come from: an address, a Blob or bytes in memory.
  *
  * A source gives pieces of the file from any place on. An address is fetched once from its start, and by ranges where bytes
- * are to be skipped and the server has ranges.
+ * are to be skipped and the server has ranges. A source also gives ranges, several at the same time.
  */
 
 import { whyUnreachable } from './unreachable.js';
@@ -51,6 +51,8 @@ export function after(bytes, source) {
       return source.size;
     },
     read: async (at, signal) => (at < bytes.length ? bytes.subarray(at) : source.read(at, signal)),
+    hasRanges: (signal) => source.hasRanges(signal),
+    range: (from, to, signal) => source.range(from, to, signal),
     close: () => source.close(),
   };
 }
@@ -83,6 +85,12 @@ class Memory {
     return at < this.size ? this.bytes.subarray(at, at + PIECE) : null;
   }
 
+  hasRanges = async () => true;
+
+  async range(from, to) {
+    return checked(this, from, to, this.bytes.subarray(from, to));
+  }
+
   close() {}
 }
 
@@ -98,7 +106,19 @@ class BlobSource {
     return new Uint8Array(await this.blob.slice(at, at + PIECE).arrayBuffer());
   }
 
+  hasRanges = async () => true;
+
+  async range(from, to) {
+    return checked(this, from, to, new Uint8Array(await this.blob.slice(from, to).arrayBuffer()));
+  }
+
   close() {}
+}
+
+/** `bytes`, if they are as many as were asked for. */
+function checked({ name }, from, to, bytes) {
+  if (bytes.length === to - from) return bytes;
+  throw new Error(`${name}: ${bytes.length} bytes came of those from ${from} to ${to}`);
 }
 
 class Address {
@@ -174,17 +194,7 @@ class Address {
     const stop = () => this.#controller?.abort(signal.reason);
     if (signal?.aborted) stop();
     signal?.addEventListener('abort', stop, { once: true });
-    const headers = at > 0 ? { Range: `bytes=${at}-` } : {};
-    let response;
-    try {
-      response = await this.#awaited(fetch(this.#address, { headers, signal: this.#controller.signal }));
-    } catch (cause) {
-      if (signal?.aborted) throw signal.reason;
-      throw new Error(`${this.name}: ${await whyUnreachable(this.#address, cause)}`, { cause });
-    }
-    if (!response.ok || !response.body) {
-      throw new Error(`${this.name}: the server answered ${response.status} ${response.statusText}`.trim());
-    }
+    const response = await this.#answer(at > 0 ? `bytes=${at}-` : undefined, this.#controller.signal);
     // A server without ranges sends the file from its start.
     this.#at = response.status === 206 ? at : 0;
     this.#piece = new Uint8Array(0);
@@ -195,6 +205,44 @@ class Address {
     }
     this.#ranges = response.status === 206 || response.headers.get('accept-ranges') === 'bytes';
     this.#reader = response.body.getReader();
+  }
+
+  async #answer(range, signal) {
+    let response;
+    try {
+      const headers = range ? { Range: range } : {};
+      response = await this.#awaited(fetch(this.#address, { headers, signal }));
+    } catch (cause) {
+      if (signal?.aborted) throw signal.reason;
+      throw new Error(`${this.name}: ${await whyUnreachable(this.#address, cause)}`, { cause });
+    }
+    if (response.ok && response.body) return response;
+    throw new Error(`${this.name}: the server answered ${response.status} ${response.statusText}`.trim());
+  }
+
+  /** Whether the server gives ranges. Some do not tell before they are asked for one. */
+  async hasRanges(signal) {
+    const response = await this.#answer('bytes=0-0', signal);
+    await response.body.cancel();
+    return response.status === 206;
+  }
+
+  /** Returns the bytes from `from` to before `to`. The running request from the start of the file ends. */
+  async range(from, to, signal) {
+    this.close();
+    const response = await this.#answer(`bytes=${from}-${to - 1}`, signal);
+    if (response.status !== 206) {
+      await response.body.cancel();
+      throw new Error(`${this.name}: the server has no ranges`);
+    }
+    let bytes;
+    try {
+      bytes = new Uint8Array(await this.#awaited(response.arrayBuffer()));
+    } catch (cause) {
+      if (signal?.aborted) throw signal.reason;
+      throw new Error(`${this.name}: the connection was cut`, { cause });
+    }
+    return checked(this, from, to, bytes);
   }
 
   close() {

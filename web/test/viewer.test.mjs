@@ -131,6 +131,29 @@ describe('the viewer with WebGPU', { skip: missing }, () => {
     assert.ok(drawn[0] > 0 && models[0].gaussians === 2600, JSON.stringify({ drawn, models }));
   });
 
+  test('the element draws within a budget, and as much as another one allows', async () => {
+    const body = `<lexi-viewer src="/golden/${SCENE}" budget="1500" still></lexi-viewer>`;
+    await writeFile(join(folder, 'host.html'), `<!doctype html><title>host</title><script type="module" src="/src/viewer/element.js"></script>${body}`);
+    await open(`${server.url}/made/host.html`);
+    const complete = (least) => page.waitForFunction((least) => {
+      const state = document.querySelector('lexi-viewer').report?.streams[0];
+      return state?.complete && state.drawn >= least && state;
+    }, least);
+    const few = await (await complete(1)).jsonValue();
+    assert.ok(few.drawn === few.splats && few.splats <= 1500, JSON.stringify(few));
+    const coarse = await rested();
+    await page.evaluate(() => (document.querySelector('lexi-viewer').budget = '5000'));
+    const more = await (await complete(few.drawn + 1)).jsonValue();
+    assert.equal(more.drawn, 2600);
+    const fine = await rested();
+    await page.evaluate(() => (document.querySelector('lexi-viewer').budget = '1500'));
+    await page.waitForFunction(() => document.querySelector('lexi-viewer').report.streams[0].drawn <= 1500);
+    const again = await rested();
+    assert.ok(psnr(coarse, again) > Math.max(SAME, psnr(coarse, fine)), `${psnr(coarse, fine)} and ${psnr(coarse, again)} dB`);
+    const ranges = server.requests.filter(({ path, range }) => path.endsWith(SCENE) && range);
+    assert.ok(ranges.length > 2, 'it is fetched by ranges');
+  });
+
   test('the page of one file draws from disk', async () => {
     const scene = (await readFile(join(golden, SCENE))).toString('base64');
     const html = (await buildPage()).replace('id="scene" data-name=""></script>', `id="scene" data-name="${SCENE}">${scene}</script>`);

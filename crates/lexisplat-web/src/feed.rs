@@ -135,7 +135,8 @@ impl Feed {
     /// Returns the job of chunk `chunk`: the data that a [`Decoder`](crate::Decoder) needs. Without `refine` the chunk is
     /// decoded as if all other chunks had come. The bytes of a chunk at its best quality are dropped.
     pub fn job(&mut self, chunk: usize, refine: bool) -> Vec<u8> {
-        let job = job::write(&self.feed, chunk, !refine);
+        let bases = if refine { self.feed.bases() } else { (0..self.done.len()).collect() };
+        let job = job::write(&self.feed, chunk, &bases);
         let is_final = self.is_final(chunk) || !refine;
         let state = if is_final { Done::Final } else { self.state(chunk) };
         if let Some(done) = self.done.get_mut(chunk) {
@@ -176,7 +177,11 @@ impl Feed {
         }
         true
     }
+}
 
+#[cfg(feature = "stream")]
+#[wasm_bindgen]
+impl Feed {
     /// Cancels the requests of all chunks that end beyond the first `gaussians` Gaussians of the file and were not
     /// decoded. Chunks of the layer before stay as they are drawn without them. Returns the number of Gaussians that will
     /// be decoded.
@@ -194,6 +199,14 @@ impl Feed {
             kept += if *given_up { 0 } else { chunk.gaussians };
         }
         kept
+    }
+}
+
+impl Feed {
+    /// Returns the feed for a scene that is drawn within a budget.
+    #[cfg(feature = "stream")]
+    pub(crate) fn into_inner(self) -> LexiFeed {
+        self.feed
     }
 
     fn state(&self, chunk: usize) -> Done {

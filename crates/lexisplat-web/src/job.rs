@@ -7,17 +7,15 @@
 use lexisplat::lexi::LexiFeed;
 use lexisplat::{Error, Result};
 
-/// Returns the job of decoding chunk `chunk` of `feed`. With `all` the chunk is decoded as if all other chunks had come.
-pub(crate) fn write(feed: &LexiFeed, chunk: usize, all: bool) -> Vec<u8> {
-    let chunks = feed.outline().map_or(0, |outline| outline.chunks.len());
-    let bases = if all { (0..chunks).collect() } else { feed.bases() };
+/// Returns the job of decoding chunk `chunk` of `feed` as if the bases of the chunks `bases`, and no others, had come.
+pub(crate) fn write(feed: &LexiFeed, chunk: usize, bases: &[usize]) -> Vec<u8> {
     let ranges = feed.ranges(chunk);
     let mut job = Vec::new();
     // A file numbers chunks and ranges by 32 bits.
     let mut number = |n: usize| job.extend(u32::try_from(n).unwrap_or(u32::MAX).to_le_bytes());
     number(chunk);
     number(bases.len());
-    bases.into_iter().for_each(&mut number);
+    bases.iter().copied().for_each(&mut number);
     number(ranges.len());
     for (at, bytes) in &ranges {
         job.extend(at.to_le_bytes());

@@ -6,6 +6,7 @@
 //! | feature | type, and where it runs | purpose |
 //! |---|---|---|
 //! | `feed` | [`Feed`], on the main thread | takes the bytes of a file as they arrive, and tells which chunk to decode next |
+//! | `stream` | [`Stream`], on the main thread | takes the ranges of a large file that a view needs within a budget |
 //! | `feed` | [`Decoder`], in each worker | decodes chunks, which it gets as [jobs](Feed::job) |
 //! | `files` | [`Whole`], in a worker | decodes files that cannot be decoded in part |
 //!
@@ -30,6 +31,8 @@ mod header;
 mod job;
 #[cfg(feature = "viewer")]
 mod parts;
+#[cfg(feature = "stream")]
+mod stream;
 #[cfg(all(feature = "viewer", target_family = "wasm"))]
 mod viewer;
 #[cfg(feature = "files")]
@@ -42,6 +45,8 @@ pub use decoder::Decoder;
 pub use feed::Feed;
 #[cfg(feature = "viewer")]
 pub use parts::open_scene;
+#[cfg(feature = "stream")]
+pub use stream::Stream;
 #[cfg(all(feature = "viewer", target_family = "wasm"))]
 pub use viewer::Viewer;
 #[cfg(feature = "files")]

@@ -4,6 +4,7 @@ import { load as loadEngine, obstacle } from './engine.js';
 import { make, reason } from './dom.js';
 import { makeDock } from './dock.js';
 import { makeHint } from './hint.js';
+import { budgetOf } from './budget.js';
 import { Keys } from './keys.js';
 import { Loads } from './loads.js';
 import { makeMarks, parseMarks } from './marks.js';
@@ -28,6 +29,7 @@ const PLACES = /^\s*(view|camera|orbit|frame)\b/;
  * @property {'all' | 'bar' | 'none'} controls the whole panel, a small bar, or nothing
  * @property {boolean} [still] whether the scene does not turn by itself
  * @property {boolean} whole whether the viewer is all of its page, which then takes keys and the wheel from everywhere
+ * @property {{splats?: number | string, bytes?: number | string}} [budget] most Gaussians that are drawn of a .lexi, and bytes of it that are held
  * @property {string} [poster] address of a still picture, shown until the scene is
  * @property {string} [label] what the scene is, for those who do not see it
  * @property {() => void} [link] copies a link; leaves the button out if there is none
@@ -101,7 +103,7 @@ export class App {
       },
     });
     this.turn = new Turn(this.stage, { element: this.element, signal, changed: () => this.dock?.update(this.report, this.turn.on) });
-    this.loads = new Loads(this.stage, {
+    this.loads = new Loads(this.stage, budgetOf(options.budget), {
       changed: (slot) => this.#changed(slot),
       formed: () => this.#tell(() => {}).catch((error) => this.fail(error)),
       begun: (slot) => this.#first(slot),
@@ -180,6 +182,11 @@ export class App {
     } catch (error) {
       this.fail(error);
     }
+  }
+
+  /** Draws within another budget. @param {Options['budget']} budget */
+  budget(budget) {
+    this.loads.budget = budgetOf(budget);
   }
 
   /** Shows annotations, a text that `parseMarks` reads. */
@@ -310,6 +317,7 @@ export class App {
     this.overlay.update(report);
     this.panel?.update(report);
     this.marks.update(report);
+    this.loads.look(report.eye);
     this.#look();
     this.options.on('view', report);
   }

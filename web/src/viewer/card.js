@@ -34,8 +34,8 @@ export function sceneCard(slot, on) {
     remove.setAttribute('aria-label', `${remove.title} ${title}`);
     const ratio = slot === 1 && first && model && first.bytes > model.bytes ? `, ${(first.bytes / model.bytes).toFixed(1)} x smaller` : '';
     say(size, model ? `${bytes(model.bytes)}${ratio}` : '');
-    const { shown = model?.gaussians } = load?.info ?? {};
-    const less = shown < model?.gaussians ? `${count(shown)} of ` : '';
+    const { budget, shown = model?.gaussians } = load?.info ?? {};
+    const less = budget ? `at most ${count(budget)} of ` : shown < model?.gaussians ? `${count(shown)} of ` : '';
     say(about, model ? `${less}${count(model.gaussians)} Gaussians, ${model.layout}` : '');
     bar.hidden = !load?.active;
     if (load?.active) setBar(bar, load);

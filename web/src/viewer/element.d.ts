@@ -50,6 +50,21 @@ export interface ViewerReport {
   degree: number | null;
   background: [number, number, number];
   models: [ViewerModel | null, ViewerModel | null];
+  /** What is drawn of each scene of which only a part is drawn. */
+  streams: (StreamState | undefined)[];
+}
+
+/** A scene with more Gaussians than the budget: what was chosen for the view, and what is there. */
+export interface StreamState {
+  /** Gaussians, and bytes of the file, that were chosen. */
+  splats: number;
+  bytes: number;
+  /** Gaussians that are on the GPU. */
+  drawn: number;
+  /** Bytes of the file that are held. */
+  held: number;
+  /** Whether all that was chosen is there. */
+  complete: boolean;
 }
 
 /** Words at a point of the scene. */
@@ -78,7 +93,7 @@ export interface SceneBytes {
 }
 
 export interface LexiViewerEventMap extends HTMLElementEventMap {
-  /** All of a scene came. */
+  /** All of a scene came, or all that the budget allows of the first view. */
   load: CustomEvent<{ slot: 0 | 1; name: string } & Partial<ViewerModel>>;
   progress: CustomEvent<{ slot: 0 | 1; loaded: number; total?: number; decoded: number; gaussians: number; ms: number; stalled?: number }> & ProgressEvent;
   /** Something failed; the viewer goes on with what it had. */
@@ -107,6 +122,13 @@ export class LexiViewer extends HTMLElement {
   annotations: string;
   /** Whether the scene does not turn by itself. It never does for people who want less motion. */
   still: boolean;
+  /**
+   * Most Gaussians that are drawn of a packed .lexi. Of a larger one is drawn what the view shows, near and coarse first.
+   * Default 3,000,000, on phones 1,000,000.
+   */
+  budget: string;
+  /** Most bytes that are held of such a file. Default 128 MiB, on phones 32 MiB. */
+  budgetBytes: string;
   /** What the scene is, in words. */
   alt: string;
   /** What is shown and its figures; undefined before there is a picture. */

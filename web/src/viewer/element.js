@@ -5,7 +5,7 @@ import { listenToDrops } from './drop.js';
 import { obstacle } from './engine.js';
 import { folder } from './folder.js';
 
-const ATTRIBUTES = ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still'];
+const ATTRIBUTES = ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still', 'budget', 'budget-bytes'];
 // Those that are there or not.
 const FLAGS = ['still'];
 // Those after a change of which the element begins anew.
@@ -18,10 +18,11 @@ const Base = globalThis.HTMLElement ?? class {};
 /**
  * Shows a scene, or two to compare. It begins when it is seen; with a poster, when it is asked to.
  *
- * Attributes, which are properties, too: `src` and `src2` (addresses), `poster` (address of a still picture), `mode`
+ * Attributes, which are properties, too (`budgetBytes` for `budget-bytes`): `src` and `src2` (addresses), `poster` (address of a still picture), `mode`
  * (first, second, side, wipe or difference; follows what the user chooses), `controls` (nothing for a small bar, `all` for the
  * panel, `none`), `camera` (the first view: a link's text, or its part after `view=`), `annotations` (JSON: a list of `at`,
- * `text`, `view`), `still` (the scene does not turn by itself), `alt` (what the scene is, in words). Events: `load`,
+ * `text`, `view`), `still` (the scene does not turn by itself), `budget` and `budget-bytes` (most Gaussians that are drawn of a
+ * .lexi, and bytes of it that are held; of a larger one is drawn what the view shows), `alt` (what the scene is, in words). Events: `load`,
  * `progress`, `error`, each with a `detail`.
  */
 export class LexiViewer extends Base {
@@ -49,6 +50,7 @@ export class LexiViewer extends Base {
       place: LexiViewer.place,
       controls: this.#controls(),
       still: this.still,
+      budget: this.#budget(),
       whole: false,
       poster: this.poster,
       label: this.alt,
@@ -84,6 +86,7 @@ export class LexiViewer extends Base {
     } else if (name === 'poster') this.#app.notice.poster(after);
     else if (name === 'alt') this.#app.label(after);
     else if (name === 'annotations') this.#app.annotate(after);
+    else if (name.startsWith('budget')) this.#app.budget(this.#budget());
     else if (!this.#begun) return;
     else if (name === 'camera') this.#app.arrange(this.#view());
     else if (name !== 'mode') this.#open(name === 'src' ? 0 : 1, after);
@@ -121,7 +124,12 @@ export class LexiViewer extends Base {
 
   /** What is shown and its figures; undefined before there is a picture. */
   get report() {
-    return this.#app?.report;
+    const report = this.#app?.report;
+    return report && { ...report, streams: this.#app.loads.streams };
+  }
+
+  #budget() {
+    return { splats: this.budget, bytes: this.budgetBytes };
   }
 
   #controls() {
@@ -150,7 +158,8 @@ export class LexiViewer extends Base {
 
 for (const name of ATTRIBUTES) {
   const flag = FLAGS.includes(name);
-  Object.defineProperty(LexiViewer.prototype, name, {
+  const property = name.replace(/-(.)/g, (_, letter) => letter.toUpperCase());
+  Object.defineProperty(LexiViewer.prototype, property, {
     configurable: true,
     enumerable: true,
     get() {

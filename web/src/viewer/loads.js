@@ -4,7 +4,7 @@ import { percent, shareOf } from './arrival.js';
 import { reason } from './dom.js';
 
 // Most bytes that a scene and its drawing may take on the GPU. Phones end pages that take more.
-const BUDGET = 2 ** 30;
+const MEMORY = 2 ** 30;
 
 /** What is known of a scene that is being loaded, or was.
  * @typedef {object} Load
@@ -15,6 +15,7 @@ const BUDGET = 2 ** 30;
  * @property {boolean} begun whether there is something to see of it
  * @property {Promise<unknown>} [last] the last part on its way to the viewer; those before are done when it is
  * @property {any} [info] what its header says
+ * @property {import('../stream.js').Stream} [stream] of a scene of which only what a view shows is drawn
  * @property {{loaded: number, total?: number, decoded: number, gaussians: number, ms: number, stalled?: number}} [progress]
  */
 
@@ -22,15 +23,19 @@ export class Loads {
   /** @type {(Load | undefined)[]} the load of each slot */
   slots = [undefined, undefined];
   #stops = [undefined, undefined];
+  #budget;
+  #eye;
 
   /**
    * `formed` is told that the viewer has a scene, `begun` that there is something to see of it.
    * @param {import('./stage.js').Stage} stage
+   * @param {import('../stream.js').Budget} budget
    * @param {{changed: (slot: number) => void, formed: (slot: number) => void, begun: (slot: number) => void, loaded: (slot: number, load: Load) => void,
    *     failed: (slot: number, message: string, error: unknown) => void}} on
    */
-  constructor(stage, on) {
+  constructor(stage, budget, on) {
     this.stage = stage;
+    this.#budget = budget;
     this.on = on;
   }
 
@@ -63,7 +68,8 @@ export class Loads {
         env,
         slot,
         signal: stop.signal,
-        budget: BUDGET,
+        budget: this.#budget,
+        memory: MEMORY,
         onForm: (bytes, info) => {
           load.info = info;
           const formed = act((viewer) => viewer.form(slot, bytes, JSON.stringify({ ...info, name: load.name })));
@@ -75,6 +81,23 @@ export class Loads {
           if (!load.begun) pending.push(part.then(() => stop.signal.aborted || this.#begun(slot, load)));
           load.last = part;
           return part;
+        },
+        onChange: ({ removed, parts }) => {
+          const change = act(async (viewer) => {
+            removed.forEach((index) => viewer.remove_part(slot, index));
+            for (const { index, part } of parts) await viewer.part(slot, index, part);
+          });
+          if (!load.begun) pending.push(change.then(() => stop.signal.aborted || this.#begun(slot, load)));
+          load.last = change;
+          return change;
+        },
+        onStream: (stream) => {
+          load.stream = stream;
+          // A scene beside another is seen from where that is.
+          if (this.#eye && this.slots[1 - slot]?.shown) stream.look(this.#eye);
+        },
+        onFail: (error) => {
+          if (!stop.signal.aborted) this.on.failed(slot, named(load.name, reason(error)), error);
         },
         onProgress: (progress) => {
           load.progress = progress;
@@ -100,6 +123,24 @@ export class Loads {
       load.active = false;
       this.on.changed(slot);
     }
+  }
+
+  /** Tells scenes of which a part is drawn from where they are seen. @param {number[] | null} eye as in the viewer's report */
+  look(eye) {
+    if (!eye) return;
+    this.#eye = eye;
+    for (const load of this.slots) load?.stream?.look(eye);
+  }
+
+  /** Keeps another budget from here on. */
+  set budget(budget) {
+    this.#budget = budget;
+    for (const load of this.slots) if (load?.stream) load.stream.budget = budget;
+  }
+
+  /** What was chosen of each scene of which a part is drawn, and what is there of it. */
+  get streams() {
+    return this.slots.map((load) => load?.stream?.state);
   }
 
   /** Stops the load of a slot. What was shown of it stays. */

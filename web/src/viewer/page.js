@@ -17,8 +17,9 @@ export function startPage(place, scenes = []) {
   const carries = scenes.some(Boolean);
   const titled = document.title !== PLAIN_TITLE;
   const root = document.getElementById('viewer').attachShadow({ mode: 'open' });
-  const app = new App(root, { place, controls, still: still !== undefined, whole: true, poster, link, on: told });
   const address = new URLSearchParams(carries ? '' : location.search);
+  const budget = { splats: address.get('budget'), bytes: address.get('budget-bytes') };
+  const app = new App(root, { place, controls, still: still !== undefined, budget, whole: true, poster, link, on: told });
   if (controls === 'all') {
     listenToDrops(window, {
       signal: new AbortController().signal,

@@ -2,8 +2,8 @@
 
 const PART = 100;
 
-export async function show(source, { slot, onForm, onPart, onProgress, signal, env, budget }) {
-  if (!(slot === 0 || slot === 1) || !env.wasm || !(budget > 0)) throw new Error('a call without what it needs');
+export async function show(source, { slot, onForm, onPart, onProgress, signal, env, budget, memory }) {
+  if (!(slot === 0 || slot === 1) || !env.wasm || !(budget.splats > 0 && budget.bytes > 0 && memory > 0)) throw new Error('a call without what it needs');
   if (location.protocol === 'file:') await echo(env.worker());
   const answer = source instanceof Blob ? new Response(source) : await fetch(source, { signal });
   if (!answer.ok) throw new Error(`the server answered ${answer.status}`);

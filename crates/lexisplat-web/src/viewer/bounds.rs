@@ -44,9 +44,11 @@ impl Bounds {
         *self = Self { slot: Some(slot), wanted, link: self.link.take(), ..Self::default() };
     }
 
-    /// Takes a part of the scene in `slot`. Returns whether the bounds should be found again.
+    /// Takes a part of the scene in `slot`. Returns whether the bounds should be found again. Parts that come when all wanted
+    /// Gaussians have come change nothing.
     pub(super) fn add(&mut self, slot: Slot, index: usize, part: &ScenePart<'_>) -> bool {
-        if self.slot != Some(slot) || self.parts.contains_key(&index) {
+        let is_whole = self.wanted > 0 && self.came >= self.wanted;
+        if is_whole || self.slot != Some(slot) || self.parts.contains_key(&index) {
             return false;
         }
         self.parts.insert(index, part.sample((part.len() as usize / SAMPLE).max(1)));

@@ -4,6 +4,7 @@ mod bounds;
 mod screen;
 
 use js_sys::{Object, Reflect, Uint8Array};
+use lexisplat::packed::Eye;
 use lexisplat_render::gpu::{SceneForm, ScenePart};
 use lexisplat_render::read_cameras_bytes;
 use lexisplat_view::{Command, DVec3, Mode, Slot, State, keys, script};
@@ -190,6 +191,16 @@ impl Viewer {
         Ok(())
     }
 
+    /// Removes part `index` of the scene of a slot.
+    ///
+    /// # Errors
+    /// An error if there is no such slot.
+    pub fn remove_part(&mut self, slot: usize, index: usize) -> Result<(), JsError> {
+        self.screen.remove_part(slot_of(slot)?, index);
+        self.drawn = None;
+        Ok(())
+    }
+
     /// Frames the part of the scene that has come, unless the user has changed the view.
     fn look_at_scene(&mut self) {
         if self.given {
@@ -262,6 +273,7 @@ impl Viewer {
                 "position": camera.position,
                 "rotation": camera.rotation,
             })),
+            "eye": camera.as_ref().map(|camera| eye(&camera.eye())),
             "camera": camera.map(|camera| camera.name),
             "cameras": self.state.cameras().len(),
             "index": self.state.index(),
@@ -319,6 +331,12 @@ impl Viewer {
         set("data", Uint8Array::from(data.as_slice()).into());
         Ok(out)
     }
+}
+
+/// Returns the numbers of `eye` for `Stream.look`; `None` for an eye that looks in all directions.
+fn eye(eye: &Eye) -> Option<[f32; 8]> {
+    let ([x, y, z], [right, down, forward]) = (eye.position, eye.forward?);
+    Some([x, y, z, right, down, forward, eye.half_angle, eye.pixel])
 }
 
 fn slot_of(slot: usize) -> Result<Slot, JsError> {

@@ -117,6 +117,12 @@ impl Screen {
         }
     }
 
+    pub(super) fn remove_part(&mut self, slot: Slot, index: usize) {
+        if let Some(scene) = &mut self.scenes[slot.index()] {
+            scene.remove(index);
+        }
+    }
+
     pub(super) fn remove(&mut self, slot: Slot) {
         self.scenes[slot.index()] = None;
     }

@@ -1,9 +1,9 @@
 //! Scenes with levels of detail, and what is chosen and held of them within a budget.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 
-use lexisplat::lexi::{FeedOptions, LexiFeed, LexiReader, StreamedScene};
+use lexisplat::lexi::{DrawnChunks, FeedOptions, LexiFeed, LexiReader, StreamedScene};
 use lexisplat::packed::{Budget, Eye, Outline, RangeKind, Selection};
 use lexisplat::{Limits, lexi};
 use lexisplat_testing::Random;
@@ -158,4 +158,63 @@ fn a_part_that_came_is_drawn_as_by_a_feed_that_has_no_more() {
         assert_eq!(scene.chunks().map(|(c, _)| c).collect::<Vec<_>>(), fresh.ready());
         assert!(scene.chunks().all(|(c, model)| fresh.decode(c).unwrap().as_ref() == Some(model)));
     }
+}
+
+/// Chunks that other feeds decode in steps of a few chunks look, after each step, as if no other chunks had come.
+#[test]
+fn steps_of_a_few_chunks_leave_no_hole() {
+    let feed = || LexiFeed::new(NAME, &FeedOptions::default(), &Limits::default());
+    let (mut whole, mut other, mut drawn) = (feed(), feed(), DrawnChunks::default());
+    whole.feed(0, &file()[..1000]).unwrap();
+    while let (None, Some(range)) = (whole.outline(), whole.wants()) {
+        whole.feed(range.start, &file()[place(range.start)..place(range.end)]).unwrap();
+    }
+    other.feed(0, whole.start().unwrap()).unwrap();
+    let mut random = Random::new(3);
+    let mut models = BTreeMap::new();
+    let mut steps = 0;
+    for _ in 0..6 {
+        let budget = Budget::default().with_splats(random.below(GAUSSIANS) as u64);
+        let chosen = whole.look(&any_eye(&mut random), &budget).unwrap();
+        loop {
+            let runs = whole.wanted_runs(3, 5000);
+            assert!(runs.len() <= 3 && runs.first() == whole.wanted_runs(1, 5000).first());
+            assert!(runs.is_sorted_by(|a, b| a.end != b.start || b.end - a.start > 5000));
+            for run in &runs {
+                whole.feed(run.start, &file()[place(run.start)..place(run.end)]).unwrap();
+            }
+            let change = drawn.update(&whole, 2);
+            change.removed.iter().for_each(|c| assert!(models.remove(c).is_some()));
+            let new = change.decoded.iter().filter(|c| !models.contains_key(*c)).count();
+            assert!(new <= 2);
+            for &c in &change.decoded {
+                other.note_bases(&change.drawn);
+                other.want(c);
+                for (at, bytes) in whole.ranges(c) {
+                    other.feed(at, bytes).unwrap();
+                }
+                models.insert(c, other.decode(c).unwrap().unwrap());
+                other.forget(c);
+            }
+            // A feed that has the bases and ranges of the drawn chunks, and no others.
+            let mut fresh = feed();
+            fresh.feed(0, whole.start().unwrap()).unwrap();
+            fresh.note_bases(&change.drawn);
+            for (&c, model) in models.iter().filter(|_| steps % 8 == 0) {
+                fresh.want(c);
+                let ranges = whole.ranges(c);
+                ranges.iter().for_each(|(at, bytes)| fresh.feed(*at, bytes).unwrap());
+                let now = fresh.decode(c).unwrap().unwrap();
+                assert_eq!(model.geometry().opacities, now.geometry().opacities, "step {steps}, chunk {c}");
+                fresh.forget(c);
+            }
+            steps += 1;
+            if runs.is_empty() && change.is_empty() {
+                break;
+            }
+        }
+        assert_eq!(models.len(), chosen.chunks.len());
+        assert!(models.iter().all(|(&c, model)| whole.decode(c).unwrap().as_ref() == Some(model)));
+    }
+    assert!(steps > 20, "{steps}");
 }

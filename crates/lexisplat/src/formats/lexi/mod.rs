@@ -24,7 +24,7 @@ mod tensors;
 mod write;
 
 pub use dictionary_file::{read_dictionary, read_dictionary_bytes, write_dictionary};
-pub use feed::{FeedOptions, LexiFeed, StreamedScene};
+pub use feed::{ChunkChange, DrawnChunks, FeedOptions, LexiFeed, StreamedScene};
 pub use layout::{CodeLayout, Layout};
 pub use reader::{LexiReader, read, read_bytes};
 pub use schema::{MAX_VERSION, PACKED_VERSION, VERSION};

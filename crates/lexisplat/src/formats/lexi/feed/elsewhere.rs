@@ -52,11 +52,12 @@ impl LexiFeed {
         (0..chunks).filter(|&c| self.came(c)).collect()
     }
 
-    /// Decodes chunks from here on as if the bases of `chunks` had come and had been forgotten. Chunks that are to
+    /// Decodes chunks from here on as if the bases of `chunks`, and no others, had come and had been forgotten. Chunks that are to
     /// be decoded here are asked for by [`Self::want`] afterwards.
     pub fn note_bases(&mut self, chunks: &[usize]) {
         if let Some(ranges) = self.ranges.as_deref_mut() {
-            chunks.iter().for_each(|&c| ranges.note_base(c));
+            (0..ranges.outline.chunks.len()).for_each(|c| ranges.note_base(c, false));
+            chunks.iter().for_each(|&c| ranges.note_base(c, true));
         }
     }
 

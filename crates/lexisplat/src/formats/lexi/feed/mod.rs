@@ -1,5 +1,6 @@
 //! Reading a packed file from bytes as they come.
 
+mod drawn;
 mod elsewhere;
 mod look;
 mod options;
@@ -23,6 +24,7 @@ use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 
+pub use self::drawn::{ChunkChange, DrawnChunks};
 pub use self::options::FeedOptions;
 pub use self::streamed::StreamedScene;
 
@@ -92,8 +94,20 @@ impl LexiFeed {
     pub fn wants(&self) -> Option<Range<u64>> {
         match &self.ranges {
             None => self.start.gap(),
-            Some(ranges) => ranges.wants(self.options.most_bytes.saturating_sub(self.held_bytes())),
+            Some(ranges) => ranges.runs(self.room(), 1, u64::MAX).pop(),
         }
+    }
+
+    /// The next runs of ranges to fetch, as [`Self::wants`], so that several can be fetched at the same time: at most `most`
+    /// runs. None has more than `longest` bytes, unless a single range has. There are none before the start of the file came.
+    #[must_use]
+    pub fn wanted_runs(&self, most: usize, longest: u64) -> Vec<Range<u64>> {
+        self.ranges.as_ref().map_or_else(Vec::new, |ranges| ranges.runs(self.room(), most, longest))
+    }
+
+    /// Bytes that may be held beside those that are.
+    fn room(&self) -> u64 {
+        self.options.most_bytes.saturating_sub(self.held_bytes())
     }
 
     /// Whether all bytes came that are asked for.

@@ -65,30 +65,32 @@ impl Ranges {
         self.outline.ranges.get(r).map(|range| range.bytes.clone()).unwrap_or_default()
     }
 
-    /// The next bytes to ask for if there is room for so many.
-    pub(super) fn wants(&self, room: u64) -> Option<Range<u64>> {
-        let mut run: Option<Range<u64>> = None;
+    /// Returns the next runs of bytes to ask for, if there is room for `room` bytes: at most `most` runs. Ranges that follow
+    /// one another are one run, unless it would have more than `longest` bytes.
+    pub(super) fn runs(&self, room: u64, most: usize, longest: u64) -> Vec<Range<u64>> {
+        let mut runs: Vec<Range<u64>> = Vec::new();
         let mut left = room;
         for &r in &self.order {
-            match (&mut run, self.states.get(r)?) {
-                (None, State::Part(part)) => return part.gap(),
-                (_, State::Missing) => {
-                    let range = self.range(r);
-                    match left.checked_sub(range.end - range.start) {
-                        Some(rest) => left = rest,
-                        None => return run,
-                    }
-                    match &mut run {
-                        Some(run) if run.end == range.start => run.end = range.end,
-                        Some(_) => return run,
-                        None => run = Some(range),
-                    }
+            let next = match self.states.get(r) {
+                Some(State::Part(part)) => part.gap(),
+                Some(State::Missing) => Some(self.range(r)),
+                _ => None,
+            };
+            let Some(next) = next else { continue };
+            if matches!(self.states.get(r), Some(State::Missing)) {
+                match left.checked_sub(next.end - next.start) {
+                    Some(rest) => left = rest,
+                    None => break,
                 }
-                (Some(_), State::Part(_)) => return run,
-                _ => {}
+            }
+            let count = runs.len();
+            match runs.last_mut() {
+                Some(run) if run.end == next.start && next.end - run.start <= longest => run.end = next.end,
+                _ if count == most => break,
+                _ => runs.push(next),
             }
         }
-        run
+        runs
     }
 
     /// The ranges of which there is something in these bytes of the file.
@@ -242,12 +244,12 @@ impl Ranges {
         matches!(state, Some(State::Whole(_) | State::Gone))
     }
 
-    /// Takes the base of chunk `c` for one that came and is not held.
-    pub(super) fn note_base(&mut self, c: usize) {
+    /// Takes the base of chunk `c` for one that came and is not held, or for one that did not come. A base that is held stays.
+    pub(super) fn note_base(&mut self, c: usize, came: bool) {
         if let Some(state) = self.base(c).and_then(|r| self.states.get_mut(r))
-            && matches!(state, State::Unwanted | State::Missing)
+            && matches!(state, State::Unwanted | State::Missing | State::Gone)
         {
-            *state = State::Gone;
+            *state = if came { State::Gone } else { State::Unwanted };
         }
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use half::f16;
 
-use super::LexiFeed;
+use super::{DrawnChunks, LexiFeed};
 use crate::packed::{Budget, Eye, Selection};
 use crate::scene::splats::Geometry;
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
@@ -43,32 +43,17 @@ use crate::support::error::Result;
 #[derive(Debug)]
 pub struct StreamedScene {
     feed: LexiFeed,
-    chunks: BTreeMap<usize, Held>,
+    drawn: DrawnChunks,
+    models: BTreeMap<usize, Model>,
     /// The view and the budget of the last look at the outline.
     looked: Option<(Eye, Budget)>,
-}
-
-/// A decoded chunk.
-#[derive(Debug)]
-struct Held {
-    arrived: Arrived,
-    model: Model,
-}
-
-/// The bases and ranges that a chunk is decoded from.
-#[derive(Debug, PartialEq, Eq)]
-struct Arrived {
-    /// Number of its ranges that came.
-    ranges: usize,
-    /// For each chunk of the next layer around it, whether its base came.
-    next: Vec<bool>,
 }
 
 impl StreamedScene {
     /// Creates a scene of which nothing is in memory. `feed` takes its file.
     #[must_use]
     pub fn new(feed: LexiFeed) -> Self {
-        Self { feed, chunks: BTreeMap::new(), looked: None }
+        Self { feed, drawn: DrawnChunks::default(), models: BTreeMap::new(), looked: None }
     }
 
     /// Returns the feed that takes the file.
@@ -86,13 +71,11 @@ impl StreamedScene {
         self.feed.wants()
     }
 
-    /// Chooses what `eye` sees within `budget`, drops all else, and asks for what is missing ([`LexiFeed::look`]).
+    /// Chooses what `eye` sees within `budget`, drops the bytes of all else, and asks for what is missing ([`LexiFeed::look`]).
+    /// Decoded chunks stay as they are until [`Self::refresh`].
     pub fn look(&mut self, eye: &Eye, budget: &Budget) -> Option<Selection> {
         let selection = self.feed.look(eye, budget)?;
         self.looked = Some((*eye, *budget));
-        let mut chosen = selection.chunks.clone();
-        chosen.sort_unstable();
-        self.chunks.retain(|c, _| chosen.binary_search(c).is_ok());
         Some(selection)
     }
 
@@ -105,29 +88,24 @@ impl StreamedScene {
     }
 
     /// Decodes the chunks of which more came, and those around which chunks of the next layer came or were dropped. Returns
-    /// their numbers. Each is there as soon as its base is.
+    /// their numbers. Each is there as soon as its base is. Drops decoded chunks whose bytes were dropped.
     ///
     /// # Errors
     /// Those of [`LexiFeed::decode`].
     pub fn refresh(&mut self) -> Result<Vec<usize>> {
-        let mut changed = Vec::new();
-        for c in self.feed.ready() {
-            let next = self.feed.around(c).map(|c| self.feed.came(c)).collect();
-            let arrived = Arrived { ranges: self.feed.whole_ranges(c), next };
-            if self.chunks.get(&c).is_some_and(|held| held.arrived == arrived) {
-                continue;
-            }
-            if let Some(model) = self.feed.decode(c)? {
-                self.chunks.insert(c, Held { arrived, model });
-                changed.push(c);
-            }
+        let change = self.drawn.update(&self.feed, usize::MAX);
+        self.models.retain(|c, _| change.removed.binary_search(c).is_err());
+        for &c in &change.decoded {
+            // After an error all chunks are decoded anew.
+            let decoded = self.feed.decode(c).inspect_err(|_| self.drawn = DrawnChunks::default())?;
+            self.models.extend(decoded.map(|model| (c, model)));
         }
-        Ok(changed)
+        Ok(change.decoded)
     }
 
     /// Returns the decoded chunks, with their numbers in the [outline](LexiFeed::outline), in ascending order.
     pub fn chunks(&self) -> impl Iterator<Item = (usize, &Model)> {
-        self.chunks.iter().map(|(c, held)| (*c, &held.model))
+        self.models.iter().map(|(c, model)| (*c, model))
     }
 
     /// Returns all decoded chunks as one scene; `None` if there are none.
