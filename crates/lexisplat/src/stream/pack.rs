@@ -3,39 +3,20 @@
 use super::observer::{Observed, Observer};
 use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
-use crate::packed::tiles::{Assembly, BUCKET, Coded, Coding, Looked, Plan, SHOWN, Sample, Steps, Tables};
-use crate::packed::{PackOptions, PackedHead, Packer, Refit};
+use crate::packed::tiles::{
+    Assembly, BUCKET, Coded, Coding, Looked, PackedFile, Plan, SHOWN, Sample, Steps, Tables,
+};
+use crate::packed::{PackOptions, Packer, Refit};
 use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity, guessed_total};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
-use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::progress::{Progress, Stage};
 use crate::support::sink::Sink;
 use crate::support::spill::{SpillTo, Temporary};
 use crate::support::stopwatch::Stopwatch;
-
-/// The results of [`pack`].
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct PackedFile {
-    /// The parts of the packed scene whose size does not depend on the number of Gaussians.
-    pub head: PackedHead,
-    /// A report of the packing.
-    pub report: CompressReport,
-    /// Number of bytes of each tensor and of the header; see [`LexiWriter::tensor_bytes`].
-    pub tensor_bytes: Vec<(String, u64)>,
-}
-
-impl PackedFile {
-    /// Returns the number of bytes of the file.
-    #[must_use]
-    pub fn file_bytes(&self) -> u64 {
-        self.tensor_bytes.iter().map(|t| t.1).sum()
-    }
-}
 
 /// Packs the scene of `source` so that its pictures have a PSNR of about `decibels` dB, and writes it to `sink`.
 ///

@@ -35,7 +35,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use assembly::Assembly;
+pub use assembly::{Assembly, PackedFile};
 pub use bucket::{Bucket, BucketReader};
 pub use coding::{Coded, Coding, Counts, Tables};
 pub(crate) use look::SHOWN;
