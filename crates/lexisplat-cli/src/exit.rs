@@ -55,13 +55,13 @@ pub(crate) struct IsFolder {
 #[derive(Debug, thiserror::Error)]
 #[error("{problem}")]
 pub(crate) struct Misuse {
-    /// What is wrong, starting with the name of the file.
+    /// The fault, starting with the name of the file.
     pub(crate) problem: String,
-    /// What was probably meant, and the command line for it.
+    /// The probable intention, and the command line for it.
     pub(crate) help: String,
 }
 
-/// The kind of a failure, which tells whose fault it is. The number is the exit code. JSON has the name.
+/// The kind of a failure: the cause of it. The number is the exit code. JSON has the name.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "lowercase")]
 enum Kind {

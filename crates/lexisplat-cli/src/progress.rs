@@ -276,7 +276,7 @@ mod tests {
             line.ends_with("drawing, 25 of 100 views, about 1 min 00 s left of this step, 20 s so far"),
             "{line}"
         );
-        // Of parts of which none is done the step says how long.
+        // While no outer unit is done, the time left is that of the step.
         let both = |done| Work { outer: Some(step(done, 4)), step: Some(step(50, 100)) };
         assert!(
             both(0).line(start, at(20)).contains(", about 20 s left, "),

@@ -15,25 +15,25 @@ pub enum Error {
         /// The error of the system.
         source: std::io::Error,
     },
-    /// The bytes are not of the format that they claim. The file is at fault.
+    /// A file is damaged, or of an unsupported kind.
     #[error("{file}: {problem}")]
     Format {
         /// The file, as the caller named it.
         file: String,
-        /// What is wrong with it.
+        /// The fault.
         problem: String,
     },
     /// A size is over a limit.
     #[error("{what}: {found} is over the limit of {limit}")]
     Limit {
-        /// The thing of which there is too much.
+        /// The measured thing.
         what: String,
         /// The size found.
         found: u64,
         /// The largest size allowed.
         limit: u64,
     },
-    /// An argument is out of range. The caller is at fault.
+    /// An argument of the caller is out of range.
     #[error("{name} = {value}: {expected}")]
     Parameter {
         /// The parameter's name.

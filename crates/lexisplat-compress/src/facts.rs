@@ -41,26 +41,26 @@ pub enum ByteCount {
     /// A whole number of bytes.
     Whole(u64),
     /// A number of bytes with a fraction.
-    Part(f64),
+    Fraction(f64),
 }
 
 impl From<f64> for ByteCount {
     fn from(bytes: f64) -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
-        if bytes >= 0.0 && bytes.fract() == 0.0 { Self::Whole(bytes as u64) } else { Self::Part(bytes) }
+        if bytes >= 0.0 && bytes.fract() == 0.0 { Self::Whole(bytes as u64) } else { Self::Fraction(bytes) }
     }
 }
 
-/// Name of the part that is the difference of the bytes of the tensor `packed.data` and the bits of its streams.
+/// Name of the entry that is the difference of the bytes of the tensor `packed.data` and the bits of its streams.
 pub(crate) const ROUNDING: &str = "rounding";
 
-/// Returns the bytes of each part of a file, by name. Their sum is the size of the file.
+/// Returns the bytes of each attribute of a file, by name. Their sum is the size of the file.
 ///
 /// `tensors` are the bytes of each tensor and of the header. For a packed file `streams` are the bits of each stream in the
 /// tensor `packed.data`. Streams are summed by attribute. Streams end in whole words, so the tensor has more bytes than the
-/// streams have bits: the part `rounding` is that difference.
+/// streams have bits. The entry `rounding` is the difference.
 #[must_use]
-pub fn part_bytes(tensors: &[(String, u64)], streams: &[StreamBits]) -> Vec<(String, f64)> {
+pub fn attribute_bytes(tensors: &[(String, u64)], streams: &[StreamBits]) -> Vec<(String, f64)> {
     let mut out: Vec<(String, f64)> = Vec::new();
     for stream in streams {
         match out.iter_mut().find(|a| a.0 == stream.attribute) {
@@ -80,10 +80,10 @@ pub fn part_bytes(tensors: &[(String, u64)], streams: &[StreamBits]) -> Vec<(Str
     out
 }
 
-/// Returns the sum of the bytes of the `parts` that hold SH-rest: the dictionary, codes and escapes.
+/// Returns the sum of the bytes of the `attributes` of SH-rest: the dictionary, codes and escapes.
 #[must_use]
-pub fn sh_bytes(parts: &[(String, f64)]) -> f64 {
+pub fn sh_bytes(attributes: &[(String, f64)]) -> f64 {
     let is_sh =
         |name: &str| name == "dictionary" || name.starts_with("codes.") || name.starts_with("escapes.");
-    parts.iter().filter(|part| is_sh(&part.0)).map(|part| part.1).sum()
+    attributes.iter().filter(|a| is_sh(&a.0)).map(|a| a.1).sum()
 }

@@ -29,7 +29,7 @@ pub(crate) fn at_most(
 ) -> Result<(Splats, Sensitivity)> {
     let (mut splats, mut sensitivity) = (splats.clone(), sensitivity);
     progress.begin(Stage::Look, (splats.len().saturating_sub(most)) as u64);
-    let parts = &OnlyCancels(progress);
+    let inner = &OnlyCancels(progress);
     while splats.len() > most {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number")]
         let share = (splats.len() as f64 * SHARE).ceil() as usize;
@@ -37,9 +37,9 @@ pub(crate) fn at_most(
         let before = splats.len();
         splats.retain(&keep);
         sensitivity.retain(&keep);
-        let fitted = fit.appearances(Scene::from(&splats), &sensitivity.appearances(), parts)?;
+        let fitted = fit.appearances(Scene::from(&splats), &sensitivity.appearances(), inner)?;
         fitted.iter().enumerate().for_each(|(i, shown)| shown.give(&mut splats.geometry, i));
-        sensitivity = views.sensitivity(renderer, &splats, parts)?;
+        sensitivity = views.sensitivity(renderer, &splats, inner)?;
         progress.advance((before - splats.len()) as u64);
     }
     progress.end();

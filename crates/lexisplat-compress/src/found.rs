@@ -48,6 +48,13 @@ pub(crate) struct Found {
     pub(crate) judges: Vec<Camera>,
 }
 
+/// Numbers of views to find.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ViewCounts {
+    pub(crate) measuring: usize,
+    pub(crate) judging: usize,
+}
+
 /// Finds `measuring` views and `judging` views, or fewer in a scene of few Gaussians, among natural views and `more`.
 /// Reports [`Stage::Draw`] to `progress`, in views. `progress` can cancel.
 ///
@@ -58,7 +65,7 @@ pub(crate) fn find(
     renderer: &mut Renderer,
     splats: &Splats,
     more: Vec<Camera>,
-    [measuring, judging]: [usize; 2],
+    ViewCounts { measuring, judging }: ViewCounts,
     progress: &dyn Progress,
 ) -> Result<Found> {
     let tried = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(*TRIED.start(), *TRIED.end());
@@ -205,7 +212,8 @@ mod tests {
 
     use super::*;
 
-    fn found(splats: &Splats, counts: [usize; 2]) -> Found {
+    fn found(splats: &Splats) -> Found {
+        let counts = ViewCounts { measuring: 10, judging: 6 };
         let more = surround(&splats.geometry, 8, GENERATED_SIZE, [2.0, 12.0]);
         find(&mut Renderer::cpu(), splats, more, counts, &Silent).unwrap()
     }
@@ -213,10 +221,10 @@ mod tests {
     #[test]
     fn views_of_detail_measure_and_others_of_it_judge() {
         let splats = scene(&SampleOptions::new(1500, 3));
-        let Found { best, judges } = found(&splats, [10, 6]);
+        let Found { best, judges } = found(&splats);
         assert_eq!((best.len(), judges.len()), (10, 6));
         assert!(judges.iter().all(|judge| !best.contains(judge)));
-        let again = found(&splats, [10, 6]);
+        let again = found(&splats);
         assert!(again.best == best && again.judges == judges);
         let mean_detail = |views: &[Camera]| {
             let draw = |view: &Camera| {
@@ -237,7 +245,7 @@ mod tests {
         let near: Vec<bool> = splats.geometry.positions.iter().map(|p| p[1].abs() < 0.02).collect();
         splats.retain(&near);
         splats.geometry.scales.iter_mut().for_each(|scales| *scales = scales.map(|s| s.min(-4.5)));
-        let Found { judges, .. } = found(&splats, [10, 6]);
+        let Found { judges, .. } = found(&splats);
         let [width, height] = [judges[0].width, judges[0].height];
         let ring = object(&splats.geometry, 6, GENERATED_SIZE[0], GENERATED_SIZE[1]);
         let ring: Vec<Camera> = ring.iter().map(|camera| camera.resized(width, height)).collect();
@@ -248,7 +256,7 @@ mod tests {
     fn scenes_without_anything_have_views() {
         let mut splats = scene(&SampleOptions::new(10, 3));
         splats.retain(&[false; 10]);
-        let Found { best, judges } = found(&splats, [10, 6]);
+        let Found { best, judges } = found(&splats);
         assert!(best.len() + judges.len() > 0);
     }
 

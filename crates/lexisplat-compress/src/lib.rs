@@ -30,7 +30,6 @@
 //!
 //! A scene in parts goes through steps 1 to 4 part by part ([`tiles`]). docs/METHOD.md has the reasons and the figures.
 
-mod alone;
 mod beginning;
 mod belonging;
 mod decibels;
@@ -39,6 +38,7 @@ mod error;
 mod facts;
 mod fewer;
 mod found;
+mod interim;
 mod judge;
 mod layout;
 mod memo;
@@ -65,7 +65,7 @@ pub use beginning::{Compress, Source, compress};
 pub use decibels::decibels;
 pub use drawing::{DrawOptions, draw_views};
 pub use error::{Error, Result};
-pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
+pub use facts::{ByteCount, RecordReport, attribute_bytes, sh_bytes};
 pub use judge::{Judge, Score};
 pub use layout::choose_layout;
 pub use packing::{Compression, DEFAULT_MEMORY, Packing, Quality};

@@ -2,7 +2,7 @@
 //!
 //! Training begins with view-dependent colours of 0. Each photograph changes them in the direction from which it was taken.
 //! The square of a Gaussian's view-dependent colour is therefore larger on average in directions that were seen. In other
-//! directions it is whatever the SH basis makes of the coefficients that the seen directions need.
+//! directions it has no meaning: it follows from the coefficients that fit the seen directions.
 
 use lexisplat::packed::curve_order;
 use lexisplat::sh::rest_basis;

@@ -5,7 +5,7 @@ use lexisplat::{Geometry, Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
 
 use crate::error::{Error, Result};
-use crate::found::{Found, GENERATED_SIZE, evenly, find};
+use crate::found::{Found, GENERATED_SIZE, ViewCounts, evenly, find};
 use crate::sharp_views::sampled;
 use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints};
 
@@ -65,9 +65,9 @@ const FITTED_FOUND: usize = 64;
 const FITTED_GIVEN: usize = 40;
 /// Number of views from all around to which base colours and opacities are fitted too, beside given cameras.
 const FITTED_AROUND: usize = 8;
-/// Share of the judging views that viewpoints are chosen from: those whose positions are nearest to the one in the middle.
+/// Share of the judging views that points of view are chosen from: the views nearest to the view in the middle.
 const USUAL_VIEWS: f32 = 0.67;
-/// Weight of the guess in [`Sensitivity::blend_with_prior`]. It is the best weight on held-out views (docs/METHOD.md).
+/// Share of the guess in [`Sensitivity::blend_with_prior`]. It is the best share on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
 
 /// A number of pixels: `always + each * gaussians`, and at most `most`.
@@ -127,7 +127,7 @@ pub fn judging_views(
     progress: &dyn Progress,
 ) -> Result<Vec<Camera>> {
     let more = around(splats).into_iter().skip(1).step_by(2).collect();
-    Ok(find(renderer, splats, more, [count, count], progress)?.judges)
+    Ok(find(renderer, splats, more, ViewCounts { measuring: count, judging: count }, progress)?.judges)
 }
 
 /// Returns views from all around `splats`.
@@ -138,10 +138,11 @@ fn around(splats: &Splats) -> Vec<Camera> {
 }
 
 /// Returns the numbers of found views of `splats` for measuring and for judging.
-fn found_views(splats: &Splats) -> [usize; 2] {
+fn found_views(splats: &Splats) -> ViewCounts {
     let views = (splats.len() / GAUSSIANS_OF_A_VIEW).clamp(*FOUND_VIEWS.start(), *FOUND_VIEWS.end());
     let measuring = views.max(splats.len() / GAUSSIANS_OF_A_LARGE_VIEW).min(MOST_FOUND_VIEWS);
-    [measuring, (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end())]
+    let judging = (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end());
+    ViewCounts { measuring, judging }
 }
 
 /// The views that packing draws: some measure the sensitivity, some judge the result.
@@ -270,7 +271,7 @@ impl PackingViews {
     /// Returns up to `most` points that represent the positions of the views that judge. Starting points are chosen far
     /// from each other. Each position belongs to the nearest starting point. The result has the middle position of each
     /// group.
-    pub(crate) fn viewpoints(&self, most: usize) -> Vec<[f32; 3]> {
+    pub(crate) fn points_of_view(&self, most: usize) -> Vec<[f32; 3]> {
         let mut positions: Vec<[f32; 3]> = self.judging.iter().map(|camera| camera.position).collect();
         let squared = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>();
         let to_nearest = |of: [f32; 3], points: &[[f32; 3]]| {

@@ -2,7 +2,7 @@
 
 use lexisplat::packed::{Appearance, PackOptions};
 use lexisplat::stream::{self, Observed, Observer};
-use lexisplat::{Model, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
+use lexisplat::{AppearanceSensitivity, Model, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
 use lexisplat_render::{Renderer, Scene};
 
 use crate::error::{Error, Result};
@@ -58,10 +58,10 @@ impl Observer<Error> for Parts<'_> {
         &mut self,
         part: &Splats,
         model: &Model,
-        weights: &[[f32; 2]],
+        sensitivities: &[AppearanceSensitivity],
         memo: &[u8],
     ) -> Result<Option<Vec<Appearance>>> {
-        refit(part, model, weights, memo, self.progress).map(Some)
+        refit(part, model, sensitivities, memo, self.progress).map(Some)
     }
 
     fn device(&self) -> Option<String> {
@@ -104,11 +104,11 @@ pub(crate) fn observe(
 pub(crate) fn refit(
     part: &Splats,
     model: &Model,
-    weights: &[[f32; 2]],
+    sensitivities: &[AppearanceSensitivity],
     memo: &[u8],
     progress: &dyn Progress,
 ) -> Result<Vec<Appearance>> {
     let progress = &OnlyCancels(progress);
     let fit = Fit::to(part, views_of(memo)?.fitting_part(part), false, progress)?;
-    fit.appearances(Scene::from(model), weights, progress)
+    fit.appearances(Scene::from(model), sensitivities, progress)
 }

@@ -8,12 +8,12 @@ use std::borrow::Borrow;
 
 use lexisplat::packed::{Appearance, Packed, Packer, Quantised};
 use lexisplat::sh::C0;
-use lexisplat::{CompressReport, Geometry, Progress, Splats, Stage};
+use lexisplat::{AppearanceSensitivity, CompressReport, Geometry, Progress, Splats, Stage};
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
 
-use crate::alone::alone;
 use crate::drawing::{DrawOptions, draw_views};
 use crate::error::Result;
+use crate::interim::interim_changes;
 use crate::only_cancels::OneStep;
 use crate::solve::{ROW, kinds, solve};
 
@@ -21,7 +21,7 @@ use crate::solve::{ROW, kinds, solve};
 /// views. More steps gain less on other views than the fitted ones (docs/METHOD.md).
 const STEPS_GIVEN: usize = 5;
 const STEPS_FOUND: usize = 3;
-/// Weight of the distance to the colours and opacities before the fit, as a multiple of a Gaussian's weight in pictures.
+/// Weight of the distance to the colours and opacities before the fit, as a multiple of the sensitivity of pictures.
 /// The term is there because other views than the fitted ones depend on these values too.
 const RIDGE: f32 = 0.5;
 /// Factor on the diagonal of the matrix in the preconditioner of opacities.
@@ -102,7 +102,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         let Some(fit) = &self.fit else { return Ok(Refitted { shown: None, file }) };
         let model = file.0.unpack()?;
         drop(file);
-        let shown = fit.appearances(Scene::from(&model), quantised.weights(), progress)?;
+        let shown = fit.appearances(Scene::from(&model), quantised.sensitivities(), progress)?;
         drop(model);
         let file = quantised.finish(Some(&shown), None, progress)?;
         Ok(Refitted { shown: Some(shown), file })
@@ -123,7 +123,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         let (Some(fit), Some(shown)) = (&self.fit, shown) else { return Ok(file) };
         let Some(first) = file.0.first_layer()? else { return Ok(file) };
         drop(file);
-        let changes = alone(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
+        let changes = interim_changes(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
         Ok(quantised.finish(Some(&shown), Some(&changes), progress)?)
     }
 
@@ -174,33 +174,33 @@ impl Fit {
         Ok(Self { cameras, targets, given })
     }
 
-    /// Returns the base colours and opacities of `scene` with which its pictures are nearest to the targets. `weights` has
-    /// for each Gaussian the sensitivities of the pictures to its colour and to the logarithm of its opacity.
+    /// Returns the base colours and opacities of `scene` with which its pictures are nearest to the targets. `sensitivities`
+    /// has the sensitivity of the pictures to the appearance of each Gaussian.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
     pub(crate) fn appearances(
         &self,
         scene: Scene<'_>,
-        weights: &[[f32; 2]],
+        sensitivities: &[AppearanceSensitivity],
         progress: &dyn Progress,
     ) -> Result<Vec<Appearance>> {
         let mut adjoint = PictureAdjoint::new(scene, &self.cameras)?;
         let steps = if self.given { STEPS_GIVEN } else { STEPS_FOUND };
         // The views are drawn once for the errors and once in each step.
         progress.begin(Stage::Draw, ((1 + steps) * self.cameras.len()) as u64);
-        let parts = &OneStep(progress);
+        let rounds = &OneStep(progress);
         let PictureErrors { errors, row_sums, opacity_squares, .. } =
-            adjoint.of_errors(&self.targets, parts)?;
+            adjoint.of_errors(&self.targets, rounds)?;
         // Sensitivities are means over three channels, and products with the adjoint are sums. Hence the factor 3.
         let ridge: Vec<GaussianChange<4>> =
-            weights.iter().map(|w| kinds(w.map(|w| RIDGE * 3.0 * w))).collect();
+            sensitivities.iter().map(|s| kinds([s.colour, s.opacity].map(|s| RIDGE * 3.0 * s))).collect();
         let mut diagonal = Vec::with_capacity(ridge.len());
         for (i, [colour, _, _, opacity]) in ridge.iter().enumerate() {
             let own = [ROW * row_sums[i] + colour, OPACITY_DIAGONAL * opacity_squares[i] + opacity];
             diagonal.push(kinds(own));
         }
-        let found = solve(&mut adjoint, errors, &ridge, &diagonal, steps, parts)?;
+        let found = solve(&mut adjoint, errors, &ridge, &diagonal, steps, rounds)?;
         progress.end();
         let geometry = scene.geometry();
         Ok(found.iter().enumerate().map(|(i, change)| changed(geometry, i, change)).collect())

@@ -5,7 +5,7 @@ use lexisplat::stream::{Compressed, PackedFile};
 use lexisplat::{CompressReport, Dictionary, Layout, Record, ShDegree};
 use serde::{Serialize, Serializer};
 
-use crate::facts::{ByteCount, ROUNDING, RecordReport, part_bytes, sh_bytes};
+use crate::facts::{ByteCount, ROUNDING, RecordReport, attribute_bytes, sh_bytes};
 use crate::target::MIN_PSNR;
 
 /// Largest usual difference of the judged quality and the worst view, in dB. A larger difference is a sign of views unlike
@@ -54,7 +54,7 @@ pub struct CompressionReport {
     pub sh_bytes: f64,
     /// Bytes of the same SH-rest as dense `f32` values.
     pub dense_sh_bytes: u64,
-    /// Bytes of each part of the file by name, as returned by [`part_bytes`].
+    /// Bytes of each attribute of the file by name, as returned by [`attribute_bytes()`].
     #[serde(serialize_with = "map")]
     pub attribute_bytes: Vec<(String, f64)>,
     /// The target asked for and the values reached, if the quality was a target.
@@ -97,7 +97,7 @@ pub struct CompressionReport {
 }
 
 /// Returns by how much the worst view falls short of the judged quality, in dB, if this exceeds 8 dB: photographs may then
-/// be as hard as that view. Returns `None` for a smaller difference, and for given views, because those are what counts.
+/// be as hard as that view. Returns `None` for a smaller difference, and for given views, which are the views that count.
 #[must_use]
 pub fn uncertain_by(reached: &ReachedRecord) -> Option<f64> {
     let below = reached.judged_psnr - reached.min_psnr;
@@ -123,7 +123,7 @@ pub enum SensitivitySource {
 }
 
 impl CompressionReport {
-    /// Returns the part of a report that all layouts have in common.
+    /// Returns the fields of a report that all layouts have in common.
     fn new(
         layout: Layout,
         gaussians: usize,
@@ -132,7 +132,7 @@ impl CompressionReport {
         report: &CompressReport,
         tensors: &[(String, u64)],
     ) -> Self {
-        let parts = part_bytes(tensors, &report.stream_bits);
+        let attributes = attribute_bytes(tensors, &report.stream_bits);
         Self {
             gaussians,
             sh_degree: degree.get(),
@@ -143,9 +143,9 @@ impl CompressionReport {
             nonzero_histogram: report.nonzero_histogram.clone(),
             escapes: report.escapes,
             file_bytes: tensors.iter().map(|t| t.1).sum(),
-            sh_bytes: sh_bytes(&parts),
+            sh_bytes: sh_bytes(&attributes),
             dense_sh_bytes: (gaussians * degree.rest() * size_of::<f32>()) as u64,
-            attribute_bytes: parts,
+            attribute_bytes: attributes,
             learn_rounds: report.learned.as_ref().map(|l| l.rounds),
             learn_sample: report.learned.as_ref().map(|l| l.sample),
             held_out_nonzeros: report.learned.as_ref().map(|l| l.held_out_nonzeros),
@@ -158,8 +158,8 @@ impl CompressionReport {
 
     /// Returns the report of a file with exact geometry.
     pub(crate) fn exact(done: Compressed, layout: Layout) -> Self {
-        let Compressed { gaussians, dictionary, record, report, attribute_bytes, write_seconds, .. } = done;
-        let shared = Self::new(layout, gaussians, dictionary.degree(), &record, &report, &attribute_bytes);
+        let Compressed { gaussians, dictionary, record, report, tensor_bytes, write_seconds, .. } = done;
+        let shared = Self::new(layout, gaussians, dictionary.degree(), &record, &report, &tensor_bytes);
         Self { atoms: dictionary.len(), write_seconds, dictionary: Some(dictionary), ..shared }
     }
 
@@ -204,20 +204,20 @@ fn to_bits(bytes: f64) -> f64 {
     (bytes * 8.0).round() / 8.0
 }
 
-/// Rounds parts to bits. The part `rounding` takes the difference, so that the sum is still that of all parts.
-fn rounded_parts(parts: &[(String, f64)]) -> Vec<(&str, ByteCount)> {
-    let mut left = to_bits(parts.iter().map(|part| part.1).sum());
-    left -= parts.iter().filter(|part| part.0 != ROUNDING).map(|part| to_bits(part.1)).sum::<f64>();
-    let part = |(name, bytes): &'_ (String, f64)| if name == ROUNDING { left } else { to_bits(*bytes) };
-    parts.iter().map(|named| (named.0.as_str(), ByteCount::from(part(named)))).collect()
+/// Rounds bytes to bits. The entry `rounding` takes the difference, so that the sum stays the same.
+fn rounded(attributes: &[(String, f64)]) -> Vec<(&str, ByteCount)> {
+    let mut left = to_bits(attributes.iter().map(|a| a.1).sum());
+    left -= attributes.iter().filter(|a| a.0 != ROUNDING).map(|a| to_bits(a.1)).sum::<f64>();
+    let own = |(name, bytes): &'_ (String, f64)| if name == ROUNDING { left } else { to_bits(*bytes) };
+    attributes.iter().map(|named| (named.0.as_str(), ByteCount::from(own(named)))).collect()
 }
 
 fn eighths<S: Serializer>(bytes: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     ByteCount::from(to_bits(*bytes)).serialize(serializer)
 }
 
-fn map<S: Serializer>(parts: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(rounded_parts(parts))
+fn map<S: Serializer>(attributes: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(rounded(attributes))
 }
 
 #[cfg(test)]
@@ -227,18 +227,15 @@ mod tests {
     #[test]
     fn rounded_parts_add_up() {
         let thirds = |name: &str, bytes: f64| (name.to_owned(), bytes / 3.0);
-        let parts =
+        let attributes =
             [thirds("scale", 10.0), thirds("dc", 10.0), thirds("position", 10.0), thirds(ROUNDING, 30.0)];
-        let found = rounded_parts(&parts);
+        let found = rounded(&attributes);
         let bytes = |count: &ByteCount| match count {
             ByteCount::Whole(bytes) => *bytes as f64,
-            ByteCount::Part(bytes) => *bytes,
+            ByteCount::Fraction(bytes) => *bytes,
         };
-        assert_eq!(found.iter().map(|part| bytes(&part.1)).sum::<f64>(), 20.0);
-        assert_eq!(
-            found.iter().map(|part| part.0).collect::<Vec<_>>(),
-            ["scale", "dc", "position", ROUNDING]
-        );
+        assert_eq!(found.iter().map(|a| bytes(&a.1)).sum::<f64>(), 20.0);
+        assert_eq!(found.iter().map(|a| a.0).collect::<Vec<_>>(), ["scale", "dc", "position", ROUNDING]);
     }
 
     #[test]

@@ -76,9 +76,9 @@ impl Compression {
     }
 }
 
-/// Number of viewpoints from which the base colours of a file are evaluated. More viewpoints gained nothing
+/// Number of points of view from which the base colours of a file are evaluated. More points gained nothing
 /// (docs/METHOD.md, "Layers").
-const VIEWPOINTS: usize = 8;
+const POINTS_OF_VIEW: usize = 8;
 
 impl Packing {
     fn run(
@@ -174,8 +174,8 @@ impl Packing {
             _ => (None, sensitivity),
         };
         let packed_scene = fewer.as_ref().unwrap_or(&splats);
-        let options = match self.options.viewpoints.is_empty() {
-            true => self.options.clone().with_viewpoints(views.viewpoints(VIEWPOINTS)),
+        let options = match self.options.points_of_view.is_empty() {
+            true => self.options.clone().with_points_of_view(views.points_of_view(POINTS_OF_VIEW)),
             false => self.options.clone(),
         };
         let packer = Packer::new(packed_scene, &sensitivity, &options)?;
@@ -209,7 +209,7 @@ impl Packing {
 
         let clock = Stopwatch::start();
         let writer = LexiWriter::packed(&packed);
-        let tensors = writer.attribute_bytes().to_vec();
+        let tensors = writer.tensor_bytes().to_vec();
         writer.write(sink, progress)?;
         let write_seconds = clock.seconds();
         let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);

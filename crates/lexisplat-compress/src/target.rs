@@ -408,8 +408,8 @@ pub(crate) fn pack_to_target(
 /// Returns the binary logarithm of the next step to try, within [`STEPS`]. It lies on the line through the two tries around
 /// the wanted value, or else beyond the last try. Returns `None` if that step was tried before.
 fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
-    // Values need not change evenly with the step: one step may change a view by decibels. Of the tries that meet the
-    // wanted value, the one nearest to those that miss it counts. Of the tries that miss it, the next one counts.
+    // Values need not change evenly with the step: one step may change a view by decibels. Some tries meet the wanted
+    // value, and some miss it. The neighbours at the border between the two count.
     let towards_below = -slope.signum();
     let above = tries
         .iter()
@@ -491,7 +491,7 @@ mod tests {
 
     #[test]
     fn a_step_at_the_limit_is_tried_once() {
-        // Bytes that stay below what is wanted, and decibels that stay below too.
+        // Bytes that stay below the wanted number, and decibels that stay below the wanted PSNR.
         for (curve, wanted, mut slope) in [
             ((|x: f64| -(1e5 - 1e3 * x).log2()) as fn(f64) -> f64, -20.0, BYTES_PER_HALVING.log2()),
             (|x| 30.0 - x, 90.0, -DB_PER_HALVING),

@@ -2,7 +2,7 @@
 
 use lexisplat::packed::Preset;
 use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
-use lexisplat::{Model, Progress, Splats};
+use lexisplat::{AppearanceSensitivity, Model, Progress, Splats};
 use lexisplat_render::Renderer;
 
 use crate::error::Result;
@@ -40,8 +40,8 @@ pub fn code(
     guessed: bool,
     progress: &dyn Progress,
 ) -> Result<(Counts, Coded)> {
-    let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
-        parts::refit(part, model, weights, looked.memo(), progress).map(Some)
+    let mut refit = |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| {
+        parts::refit(part, model, own, looked.memo(), progress).map(Some)
     };
     coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut refit) }, progress)
 }

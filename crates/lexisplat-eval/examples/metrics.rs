@@ -8,7 +8,7 @@
 use std::error::Error;
 use std::time::Instant;
 
-use lexisplat_eval::metrics::lpips::{Network, Range};
+use lexisplat_eval::metrics::lpips::{Network, PixelRange};
 use lexisplat_eval::metrics::{Lpips, Metric, flip, psnr, ssim, ssim_inner};
 use lexisplat_render::Image;
 use serde_json::{Map, Value, json};
@@ -70,8 +70,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             Network::Vgg => [Metric::LpipsVgg, Metric::LpipsVggInria],
             Network::Alex => [Metric::LpipsAlex, Metric::LpipsAlexInria],
         };
-        put(standard.name(), run(timed, || lpips.distance(&a, &b, Range::Standard).map(Some))?);
-        put(inria.name(), run(timed, || lpips.distance(&a, &b, Range::Inria).map(Some))?);
+        put(standard.name(), run(timed, || lpips.distance(&a, &b, PixelRange::Standard).map(Some))?);
+        put(inria.name(), run(timed, || lpips.distance(&a, &b, PixelRange::Inria).map(Some))?);
     }
     println!("{}", Value::Object(out));
     Ok(())

@@ -26,15 +26,15 @@ pub fn difference(a: &Image, b: &Image) -> Image {
 /// Returns `a`, `b` and their amplified difference side by side, in 8 bits: width, height, and pixels row by row.
 #[must_use]
 pub fn montage(a: &Image, b: &Image) -> (u32, u32, Vec<[u8; 3]>) {
-    let parts = [a.to_8bit(), b.to_8bit(), difference(a, b).to_8bit()];
+    let pictures = [a.to_8bit(), b.to_8bit(), difference(a, b).to_8bit()];
     let width = a.width as usize;
     let mut out = Vec::new();
     for y in 0..a.height as usize {
-        for (i, part) in parts.iter().enumerate() {
+        for (i, picture) in pictures.iter().enumerate() {
             if i > 0 {
                 out.extend(std::iter::repeat_n(GAP_COLOUR, GAP as usize));
             }
-            out.extend_from_slice(&part[y * width..(y + 1) * width]);
+            out.extend_from_slice(&picture[y * width..(y + 1) * width]);
         }
     }
     (3 * a.width + 2 * GAP, a.height, out)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lexisplat_render::Image;
 
-use crate::metrics::lpips::{Network, Range};
+use crate::metrics::lpips::{Network, PixelRange};
 use crate::metrics::{Lpips, Metric, flip, psnr, ssim};
 use crate::scores::ViewScore;
 use lexisplat_compress::Result;
@@ -74,10 +74,14 @@ impl Scorer {
 }
 
 /// Returns the metrics of a network, each with its range of pixel values.
-fn lpips_metrics(network: Network) -> [(Metric, Range); 2] {
+fn lpips_metrics(network: Network) -> [(Metric, PixelRange); 2] {
     match network {
-        Network::Vgg => [(Metric::LpipsVgg, Range::Standard), (Metric::LpipsVggInria, Range::Inria)],
-        Network::Alex => [(Metric::LpipsAlex, Range::Standard), (Metric::LpipsAlexInria, Range::Inria)],
+        Network::Vgg => {
+            [(Metric::LpipsVgg, PixelRange::Standard), (Metric::LpipsVggInria, PixelRange::Inria)]
+        }
+        Network::Alex => {
+            [(Metric::LpipsAlex, PixelRange::Standard), (Metric::LpipsAlexInria, PixelRange::Inria)]
+        }
     }
 }
 
@@ -95,7 +99,8 @@ mod tests {
         assert!(basic.score("view", &a, &b).unwrap().more.is_empty());
 
         let lpips = random(Network::Alex, 1);
-        let expected = [Range::Standard, Range::Inria].map(|range| lpips.distance(&a, &b, range).unwrap());
+        let expected =
+            [PixelRange::Standard, PixelRange::Inria].map(|range| lpips.distance(&a, &b, range).unwrap());
         let scorer = Scorer::new().with_lpips(random(Network::Alex, 2)).with_lpips(lpips).with_flip();
         let metrics = [Metric::Psnr, Metric::Ssim, Metric::Flip, Metric::LpipsAlex, Metric::LpipsAlexInria];
         assert_eq!(scorer.metrics(), metrics);

@@ -64,12 +64,13 @@ pub struct Summary {
     pub max: Option<f64>,
 }
 
-/// The name of a part of a summary, and the function that returns the part.
-type Part = (&'static str, fn(&Summary) -> Option<f64>);
+/// The name of a statistic, and the function that returns it.
+type Statistic = (&'static str, fn(&Summary) -> Option<f64>);
 
 impl Summary {
-    /// The names of the parts, and the functions that return them.
-    pub const PARTS: [Part; 3] = [("mean", |s| s.mean), ("minimum", |s| s.min), ("maximum", |s| s.max)];
+    /// The names of the statistics, and the functions that return them.
+    pub const STATISTICS: [Statistic; 3] =
+        [("mean", |s| s.mean), ("minimum", |s| s.min), ("maximum", |s| s.max)];
 
     /// Returns the summary of `values`.
     #[must_use]

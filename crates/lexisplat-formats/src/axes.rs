@@ -24,7 +24,7 @@ impl Flip {
         [0, 1, 2].map(|k| self.0[k] * position[k])
     }
 
-    /// Returns the factors on the parts (x, y, z) of a quaternion. Each is the product of the factors on the two other
+    /// Returns the factors on the components (x, y, z) of a quaternion. Each is the product of the factors on the two other
     /// axes, which span the plane of rotation.
     pub(crate) fn turns(self) -> [f32; 3] {
         let [x, y, z] = self.0;

@@ -162,7 +162,7 @@ mod tests {
         assert!((splats.geometry.scales[0][0] - scales[0] - 2.0_f32.ln()).abs() < 1e-6);
     }
 
-    /// A turned scene shows from a turned direction what the scene showed from that direction.
+    /// The colour of a turned scene in a turned direction is the colour of the scene in that direction.
     #[test]
     fn turned_scenes_look_the_same_from_turned_directions() {
         let plain = sample();
@@ -193,7 +193,7 @@ mod tests {
         }
     }
 
-    /// What is done to a scene with an offset is what is done to positions with the offset.
+    /// A change of a scene with an offset is the same change of the positions in the world.
     #[test]
     fn the_offset_counts() {
         let near = sample();

@@ -25,8 +25,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`Edits`] cuts, scales, turns and moves a scene, and [`merge`](fn@merge) appends one scene to another. docs/FORMATS.md lists for
-//! each format what it holds, its axes, and what is lost.
+//! [`Edits`] cuts, scales, turns and moves a scene, and [`merge`](fn@merge) appends one scene to another. docs/FORMATS.md
+//! lists for each format its content, its axes, and the properties that are lost.
 //!
 //! Scenes in memory have the axes of a trainer's PLY. Readers turn scenes to these axes, and writers turn them back.
 

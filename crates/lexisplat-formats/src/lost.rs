@@ -1,4 +1,4 @@
-//! What a written file lacks of a scene.
+//! The properties of a scene that a written file lacks.
 
 use lexisplat::{Offset, ShDegree, Splats};
 use serde::Serialize;
@@ -26,8 +26,8 @@ pub struct Lost {
 }
 
 impl Lost {
-    /// Returns what a file of `degree` without extras and normals lacks of `splats`. `antialiased` tells whether the file
-    /// keeps the mark of anti-aliasing.
+    /// Returns the properties of `splats` that a file of `degree` without extras and normals lacks. `antialiased` tells
+    /// whether the file keeps the mark of anti-aliasing.
     pub(crate) fn beside(splats: &Splats, degree: ShDegree, antialiased: bool) -> Self {
         Self {
             sh_degree: (degree < splats.degree).then(|| [splats.degree.get(), degree.get()]),

@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use lexisplat::ply::ReadOptions;
-use lexisplat::{Error, FormatError, Geometry, Limits, Result, SURE_OPACITY, SplatSource, Splats};
+use lexisplat::{
+    DroppedRows, Error, FormatError, Geometry, Limits, Result, SURE_OPACITY, SplatSource, Splats,
+};
 use serde_json::Value;
 
 use crate::rows::{Described, RowsMut};
@@ -25,8 +27,7 @@ pub struct FormatSource<'a> {
     sizes: Sizes,
     limits: Limits,
     file: Described<'a>,
-    /// Indices of the Gaussians left out, in ascending order.
-    dropped: Vec<usize>,
+    dropped: DroppedRows,
 }
 
 impl<'a> FormatSource<'a> {
@@ -42,7 +43,7 @@ impl<'a> FormatSource<'a> {
             file.warnings.push("the scene holds no Gaussians".to_owned());
         }
         let limits = options.limits;
-        let mut source = Self { name: name.to_owned(), sizes, limits, file, dropped: Vec::new() };
+        let mut source = Self { name: name.to_owned(), sizes, limits, file, dropped: DroppedRows::default() };
         if !source.file.rows.is_finite() {
             source.look(options)?;
         }
@@ -72,7 +73,7 @@ impl<'a> FormatSource<'a> {
             return Err(Error::format(&*self.name, problem));
         }
         self.file.warnings.push(format!("{count} Gaussians with NaN or infinite values are left out"));
-        self.dropped = dropped;
+        self.dropped = DroppedRows::new(dropped);
         Ok(())
     }
 
@@ -109,21 +110,6 @@ impl<'a> FormatSource<'a> {
         #[cfg(not(feature = "parallel"))]
         pieces.into_iter().for_each(fill);
         Ok(())
-    }
-
-    /// Returns the row in the file of Gaussian `gaussian`.
-    fn row(&self, gaussian: usize) -> usize {
-        // `dropped[j] - j` Gaussians come before row `dropped[j]`.
-        let (mut low, mut high) = (0, self.dropped.len());
-        while low < high {
-            let middle = low.midpoint(high);
-            if self.dropped[middle] - middle <= gaussian {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        gaussian + low
     }
 }
 
@@ -163,7 +149,7 @@ fn not_finite(part: &Splats, i: usize) -> Option<&'static str> {
 
 impl SplatSource for FormatSource<'_> {
     fn len(&self) -> usize {
-        self.file.len - self.dropped.len()
+        self.file.len - self.dropped.count()
     }
 
     fn empty(&self) -> Splats {
@@ -192,22 +178,9 @@ impl SplatSource for FormatSource<'_> {
     }
 
     fn read(&self, range: Range<usize>, part: &mut Splats) -> Result<()> {
-        if range.start > range.end || range.end > self.len() {
-            let expected = format!("at most {} Gaussians", self.len());
-            return Err(Error::parameter("range", format!("{range:?}"), expected));
-        }
-        let Some(last) = range.end.checked_sub(1).filter(|&last| last >= range.start) else {
-            return self.fill(0..0, part);
-        };
-        let rows = self.row(range.start)..self.row(last) + 1;
+        let rows = self.dropped.rows(&range, self.file.len)?;
         self.fill(rows.clone(), part)?;
-        let from = |row: usize| self.dropped.partition_point(|&dropped| dropped < row);
-        let dropped = &self.dropped[from(rows.start)..from(rows.end)];
-        if !dropped.is_empty() {
-            let mut keep = vec![true; rows.len()];
-            dropped.iter().for_each(|&row| keep[row - rows.start] = false);
-            part.retain(&keep);
-        }
+        self.dropped.remove(rows, part);
         Ok(())
     }
 }

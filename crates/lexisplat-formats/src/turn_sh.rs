@@ -1,8 +1,8 @@
 //! SH coefficients of a rotated scene.
 //!
-//! A rotated scene shows in the rotated direction R d what the scene shows in direction d. The coefficients of degree l
-//! of the rotated scene are those of the scene times a matrix. Its entries are the integrals of b(R d) b(d) over the
-//! sphere, where b are the basis functions of that degree. The integrals are exact sums over few directions.
+//! The colour of a rotated scene in the rotated direction R d is the colour of the scene in direction d. The coefficients
+//! of degree l of the rotated scene are those of the scene times a matrix. Its entries are the integrals of b(R d) b(d)
+//! over the sphere, where b are the basis functions of that degree. The integrals are exact sums over few directions.
 
 use lexisplat::ShDegree;
 use lexisplat::sh::{MAX_COEFFICIENTS, MAX_DEGREE, rest_basis};

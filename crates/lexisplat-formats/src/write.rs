@@ -7,7 +7,8 @@ use crate::lost::Lost;
 use crate::write_options::WriteOptions;
 use crate::{compressed_ply, gltf, sog, splat, spz};
 
-/// Writes `splats` in the format `kind`. Returns the number of bytes, and what the file lacks of the scene.
+/// Writes `splats` in the format `kind`. Returns the number of bytes, and the properties of the scene that the file
+/// lacks.
 ///
 /// The bytes depend only on the scene and the options.
 ///

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use lexisplat::lexi::LexiReader;
 use lexisplat::{Indices, Limits, SplatSource as _, Values, stream};
-use lexisplat_compress::{RecordReport, part_bytes};
+use lexisplat_compress::{RecordReport, attribute_bytes};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -126,7 +126,7 @@ impl Scene {
             let reader = held.reader()?;
             let survey = stream::survey(reader, &std::env::temp_dir())?;
             let head = reader.packed_head();
-            let parts = part_bytes(reader.attribute_bytes(), &survey.stream_bits);
+            let parts = attribute_bytes(reader.tensor_bytes(), &survey.stream_bits);
             Ok(json!({
                 "gaussians": reader.len(),
                 "sh_degree": reader.degree().get(),

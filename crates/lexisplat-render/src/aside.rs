@@ -1,4 +1,4 @@
-//! Views beside given cameras, for measuring what shows there.
+//! Views beside given cameras, for measuring the sensitivity there.
 //!
 //! People look at a scene from places beside its cameras too: from nearer, from further away and from the side.
 
@@ -113,7 +113,7 @@ mod tests {
             view.validate().unwrap();
             let of = &cameras[1 + 3 * k];
             assert_eq!((&view.name, view.width, view.fx), (&of.name, of.width, of.fx));
-            // What is in the middle of the one picture is in the middle of the other.
+            // The two pictures have the same point in the middle.
             let distance = subject_distance(of, &geometry).unwrap();
             let forward = |camera: &Camera| DVec3::from_array(camera.rotation.map(|row| f64::from(row[2])));
             let subject = DVec3::from_array(of.position.map(f64::from)) + distance * forward(of);

@@ -28,7 +28,7 @@ pub enum Error {
     /// A size is over a limit of this GPU. The CPU renderer has no such limit.
     #[error("{what}: {found} is over the limit of {limit}")]
     GpuLimit {
-        /// The thing of which there is too much.
+        /// The measured thing.
         what: String,
         /// The size found.
         found: u64,

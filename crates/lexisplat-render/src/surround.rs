@@ -1,4 +1,4 @@
-//! Views from all around a scene without cameras, for measuring what shows in it.
+//! Views from all around a scene without cameras, for measuring its sensitivity.
 
 use glam::DVec3;
 use lexisplat::Geometry;

@@ -10,8 +10,8 @@ use crate::parallel::*;
 /// the number of threads.
 const GAUSSIANS_PER_TASK: usize = 8192;
 /// Largest number of Gaussians that are looked at. Of a larger scene every second, every third and so on is looked at,
-/// and counts two, three and so on times. This is enough to tell what is in the way, and takes seconds for the largest
-/// scenes.
+/// and counts two, three and so on times. This is enough to find opaque Gaussians in the way, and takes seconds for the
+/// largest scenes.
 const MAX_ASKED: usize = 1 << 20;
 /// Number of standard deviations beyond which every Gaussian is below [`ALPHA_MIN`]: `sqrt(2 ln 255)`.
 const REACH_SIGMAS: f64 = 3.33;

@@ -8,7 +8,7 @@ use super::{Results, csv_text};
 /// Columns of [`long_csv`].
 const HEADER: [&str; 8] = ["dataset", "scene", "method", "setting", "against", "view", "metric", "value"];
 
-/// The last four columns: what the number is against, its view, its name, and the number.
+/// The last four columns: the reference of the number, its view, its name, and the number.
 type Value = [String; 4];
 
 /// Returns a CSV with one number on each line.

@@ -44,7 +44,7 @@
 //! | module | purpose |
 //! |---|---|
 //! | `command`, [`keys`], [`script`] | all commands; their keys; their words in scripts |
-//! | `state` | what is shown and from where |
+//! | `state` | the shown scenes and the camera |
 //! | `camera_controller`, `gesture` | orbiting, panning and flying; the effect of mouse, fingers and held keys |
 //! | `pose`, `link` | the place and direction of the free camera as text; a link to exactly the view shown |
 //! | `picture`, `present`, `compose` | with `gpu`: one or two pictures on screen, or in memory |

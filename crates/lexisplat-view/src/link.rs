@@ -66,7 +66,7 @@ impl State {
         Ok(())
     }
 
-    /// Returns an error if `command` is not allowed in a link. The error tells what is allowed.
+    /// Returns an error if `command` is not allowed in a link. The error lists the allowed commands.
     fn check(&self, command: &Command) -> std::result::Result<(), String> {
         let share = |v: &f32| (0.0..=1.0).contains(v);
         let (fits, expected) = match command {

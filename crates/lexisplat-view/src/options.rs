@@ -29,7 +29,7 @@ pub struct Options {
     pub device: Device,
     /// Whether a screenshot with a given name may replace a file.
     pub overwrite: bool,
-    /// Limits on what files may make the program allocate, including files dropped on the window.
+    /// Limits on files, also on files that are dropped on the window.
     pub limits: Limits,
     /// Commands to carry out at the start, in the words of [`SCRIPT_WORDS`](crate::SCRIPT_WORDS); may be empty.
     pub script: String,

@@ -1,4 +1,4 @@
-//! The state of the view: what is shown and from where. It is independent of windows.
+//! The state of the view: the shown scenes and the camera. It is independent of windows.
 
 use lexisplat_render::{Camera, RenderOptions};
 
@@ -29,7 +29,7 @@ impl Arrangement {
     }
 }
 
-/// The state of the view: what is shown and from where.
+/// The state of the view: the shown scenes and the camera.
 #[derive(Debug)]
 pub struct State {
     /// Cameras to step through.

@@ -23,7 +23,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! For files several times smaller, quantised throughout by what shows in pictures, there is [`packed`]:
+//! [`packed`] makes files several times smaller. It quantises all values as coarsely as pictures allow:
 //!
 //! ```
 //! use lexisplat::packed::{PackOptions, Packer};
@@ -43,13 +43,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`compress()`] does everything; [`mod@learn`] and [`pursuit`] are its parts. [`ply`] and [`lexi`] are the
-//! files, [`Splats`] and [`Model`] what they hold. docs/METHOD.md has the mathematics, docs/FORMAT.md the
-//! file.
+//! [`compress()`] learns a dictionary ([`mod@learn`]) and codes every Gaussian with it ([`pursuit`]). [`ply`] and
+//! [`lexi`] read and write files. [`Splats`] is the scene of a PLY, and [`Model`] that of a .lexi. docs/METHOD.md has the
+//! mathematics, docs/FORMAT.md the file.
 //!
-//! The features `encode`, `parallel` and `mmap` are on by default. Without `encode` the crate reads every file, and neither learns
-//! nor packs. Without the other two it needs neither threads nor files and builds for `wasm32-unknown-unknown`; results are the
-//! same bit for bit.
+//! The features `encode`, `parallel` and `mmap` are on by default. Without `encode` the crate reads every file, and
+//! neither learns nor packs. Without the other two it needs neither threads nor files, and builds for
+//! `wasm32-unknown-unknown`. Results are the same bit for bit.
 
 #![cfg_attr(
     not(feature = "encode"),
@@ -71,12 +71,13 @@ mod support;
 pub use formats::kind::{FileKind, Unsupported, without_byte_order_mark};
 pub use formats::lexi::{CodeLayout, Layout};
 pub use formats::{lexi, ply};
+pub use scene::dropped::DroppedRows;
 pub use scene::extra::{Extra, ExtraValues};
 pub use scene::joined::Joined;
 pub use scene::moved::unite;
 pub use scene::offset::Offset;
 pub use scene::rounding::Rounding;
-pub use scene::sensitivity::Sensitivity;
+pub use scene::sensitivity::{AppearanceSensitivity, Sensitivity};
 pub use scene::sh::ShDegree;
 pub use scene::source::SplatSource;
 pub use scene::splats::{FLAT_SCALE, Geometry, SURE_OPACITY, SceneMeta, Splats, flatten_scales};

@@ -36,7 +36,7 @@ fn todays_bytes_are_the_golden_ones() {
         let writer = LexiWriter::exact(&model, codes).unwrap();
         assert_eq!(writer.file_bytes(), bytes.len() as u64, "{name}");
         let reader = LexiReader::open(name, bytes, &Limits::default()).unwrap();
-        assert_eq!(writer.attribute_bytes(), reader.attribute_bytes(), "{name}");
+        assert_eq!(writer.tensor_bytes(), reader.tensor_bytes(), "{name}");
     }
 }
 

@@ -89,7 +89,7 @@ fn regenerate() {
     let (packed, _) = pack(&splats, |o| {
         o.layers_from = 1000;
         o.atoms = Some(260);
-        o.viewpoints = vec![[6.0, 0.0, 1.0], [-2.0, 5.0, 1.0], [-2.0, -5.0, 2.0]];
+        o.points_of_view = vec![[6.0, 0.0, 1.0], [-2.0, 5.0, 1.0], [-2.0, -5.0, 2.0]];
     });
     write(LAYERS.0, &packed);
     std::fs::write(golden(LAYERS.0, "first.ply"), first_part(&packed, SHOWN_TENTHS)).unwrap();

@@ -61,10 +61,9 @@ fn an_exact_file_made_and_undone_part_by_part_is_that_of_the_whole_scene() {
         assert!(std::fs::read(path("out.lexi")).unwrap() == expected, "{threads} threads");
         assert_eq!(&done.record, model.record());
         assert_eq!(
-            done.attribute_bytes,
-            lexi::LexiWriter::exact(&model, CodeLayout::Compact).unwrap().attribute_bytes()
+            done.tensor_bytes,
+            lexi::LexiWriter::exact(&model, CodeLayout::Compact).unwrap().tensor_bytes()
         );
-        assert_eq!(done.sh_bytes(), lexi::LexiWriter::exact(&model, CodeLayout::Compact).unwrap().sh_bytes());
     }
     let bytes = Input::open(&path("out.lexi")).unwrap();
     let chunks = LexiReader::open("out.lexi", &bytes, &Limits::default()).unwrap();
@@ -80,8 +79,8 @@ fn an_exact_file_made_and_undone_part_by_part_is_that_of_the_whole_scene() {
     assert_eq!(survey.nonzero_histogram.iter().sum::<u64>() + survey.escapes, GAUSSIANS as u64);
     assert_eq!(survey.atom_usage.iter().sum::<u64>(), survey.nonzeros);
     assert_eq!(
-        chunks.attribute_bytes(),
-        lexi::LexiWriter::exact(&model, CodeLayout::Compact).unwrap().attribute_bytes()
+        chunks.tensor_bytes(),
+        lexi::LexiWriter::exact(&model, CodeLayout::Compact).unwrap().tensor_bytes()
     );
     assert_eq!(files(folder.path()), 3);
 }
@@ -119,7 +118,7 @@ fn a_packed_file_in_either_order_comes_out_as_if_read_whole() {
         let model = lexi::read_bytes("t.lexi", &bytes, &Limits::default()).unwrap();
         let chunks = LexiReader::open("t.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(chunks.order_kept(), keep_order);
-        assert_eq!(chunks.attribute_bytes(), lexi::LexiWriter::packed(&packed).attribute_bytes());
+        assert_eq!(chunks.tensor_bytes(), lexi::LexiWriter::packed(&packed).tensor_bytes());
         let (mut expected, mut found) = (Vec::new(), Vec::new());
         ply::write(&mut expected, &model.clone().into_splats()).unwrap();
         stream::decompress(&chunks, &mut found, &Silent).unwrap();

@@ -232,7 +232,7 @@ fn several_layers(root: &Path) -> Done {
             let mut splats = sample(gaussians, degree);
             let mut options = PackOptions::default();
             options.layers_from = 0;
-            options.viewpoints = [[0.0, -1.0, -4.0], [3.0, -1.0, 2.0]][..points].to_vec();
+            options.points_of_view = [[0.0, -1.0, -4.0], [3.0, -1.0, 2.0]][..points].to_vec();
             if degree != ShDegree::ZERO {
                 options.atoms = Some(ATOMS);
                 splats.sh_rest[..degree.rest()].fill(1e6);

@@ -66,8 +66,8 @@ pub(crate) struct Compress {
     /// packed files have an order of their own.
     #[arg(long)]
     pub(crate) keep_order: bool,
-    /// Add levels of detail to a large scene: layers of fewer Gaussians, of which readers draw far parts. A scene of 20
-    /// million Gaussians has 5 layers instead of 2. Each layer takes 0.15 to 0.25 % more bytes.
+    /// Add levels of detail to a large scene: layers of fewer Gaussians, from which readers draw distant parts. A scene
+    /// of 20 million Gaussians has 5 layers instead of 2. Each layer takes 0.15 to 0.25 % more bytes.
     #[arg(long)]
     pub(crate) lod: bool,
     /// Keep all Gaussians. Without this option packing leaves out Gaussians whose effect on the pictures is not worth
@@ -140,7 +140,7 @@ pub(crate) struct Compress {
     /// machine. A GPU is faster. The file then records the name of the GPU.
     #[arg(long, default_value = "cpu", value_name = "auto|cpu|gpu|N")]
     pub(crate) device: Device,
-    /// Print the details too: bytes and bits of each part of the file, statistics of the codes, and seconds of each
+    /// Print the details too: bytes and bits of each attribute of the file, statistics of the codes, and seconds of each
     /// step.
     #[arg(long)]
     pub(crate) all: bool,

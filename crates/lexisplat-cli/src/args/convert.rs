@@ -17,10 +17,10 @@ const FORMATS: &str = "Options of formats";
 /// Convert a scene to another format. Several scenes are merged into one.
 ///
 /// Reads and writes PLY, .lexi, SPZ, SOG, compressed.ply, .splat and glb, and reads .ksplat and .gltf. The format of an
-/// input is told by its content. What the output format cannot hold is left out and printed. A .lexi output is made as
-/// by `lexisplat compress` without options; `lexisplat compress` reads all of these formats itself. docs/FORMATS.md
-/// describes the axes and the precision of each format. Example: `lexisplat convert a.spz b.ply scene.spz` merges two
-/// scenes into scene.spz.
+/// input is told by its content. Properties that the output format cannot hold are left out and listed. A .lexi output is
+/// made as by `lexisplat compress` without options; `lexisplat compress` reads all of these formats itself.
+/// docs/FORMATS.md describes the axes and the precision of each format. Example: `lexisplat convert a.spz b.ply
+/// scene.spz` merges two scenes into scene.spz.
 #[derive(Debug, Args)]
 pub(crate) struct Convert {
     /// One or more scenes to read, then the file to write.
@@ -57,8 +57,8 @@ pub(crate) struct Convert {
     /// as 90,0,0. SH are rotated too.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true, help_heading = CHANGES)]
     pub(crate) rotate: Option<[f64; 3]>,
-    /// Move the scene by this vector, such as 0,0,-1.5. Sums are in double precision: what single precision cannot hold
-    /// is kept as an offset of the scene. Moving the scene back removes the offset.
+    /// Move the scene by this vector, such as 0,0,-1.5. Sums are in double precision. If single precision cannot hold
+    /// them, the scene gets an offset. Moving the scene back removes the offset.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true, help_heading = CHANGES)]
     pub(crate) translate: Option<[f64; 3]>,
     /// Version of SPZ to write: 2, 3 or 4 [default: 4].

@@ -19,8 +19,8 @@ pub(crate) struct Render {
     pub(crate) output: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) part: Part,
-    /// Draw each view of a packed file with at most N Gaussians: near and visible parts in full, the others from the
-    /// layers that come first. Only the ranges of the file that a view needs are read, decoded and held. `compress --lod`
+    /// Draw each view of a packed file with at most N Gaussians: near and visible chunks in full, the others from the
+    /// first layers. Only the ranges of the file that a view needs are read, decoded and held. `compress --lod`
     /// makes files for it.
     #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=u64::MAX), conflicts_with = "first")]
     pub(crate) budget: Option<u64>,
@@ -64,7 +64,8 @@ pub(crate) struct View {
     pub(crate) files: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) views: Views,
-    /// Actions for tests and recordings, such as `camera=3,mode=wipe,screenshot=a.png,quit`. `--help` lists the words.
+    /// Actions for tests and recordings, such as `camera=3,mode=wipe,screenshot=a.png,quit`. The end of `lexisplat view
+    /// --help` lists the words.
     #[arg(long, value_name = "WORDS", default_value = "", hide_default_value = true)]
     pub(crate) actions: String,
 }

@@ -110,7 +110,7 @@ impl Command {
 pub(crate) struct Info {
     /// The scene file, of any format; `-` reads standard input.
     pub(crate) file: PathBuf,
-    /// Print all details: ranges of all attributes and histograms, and for a .lexi its parts, layers and atoms.
+    /// Print all details: ranges of all attributes and histograms, and for a .lexi its attributes, layers and atoms.
     #[arg(long)]
     pub(crate) all: bool,
     /// Leave out Gaussians with NaN or infinite values. Without this option a file with such values is refused. Sizes

@@ -15,8 +15,8 @@ pub(crate) struct Part {
     /// a kept order are left out.
     #[arg(long, value_name = "PART", value_parser = first)]
     pub(crate) first: Option<First>,
-    /// Read at most N of a packed file's parts of SH beyond the base colour, in descending order of their effect on the
-    /// pictures. 0 leaves view-dependent colour out. `info` lists the parts.
+    /// Read at most N of the SH parts of a packed file. The first has the largest SH values beyond the base colour. 0
+    /// leaves view-dependent colour out. `info` lists the SH parts.
     #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX))]
     pub(crate) sh_parts: Option<usize>,
 }

@@ -161,7 +161,7 @@ fn psnr(output: &Path, splats: &Splats, common: &Common, bars: &Bars) -> Result<
     Ok(serde_json::to_value(found.psnr)?)
 }
 
-/// Returns what a file lacks, one phrase each.
+/// Returns the properties that a file lacks, one phrase each.
 fn lost_lines(lost: &Lost) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some([from, to]) = lost.sh_degree {

@@ -52,7 +52,7 @@ impl<'a, F: Fn(Metric, Option<f64>) -> String> ScoreTable<'a, F> {
 
     /// Writes a line for each part of the summary.
     pub(super) fn summary(&self, out: &mut String) -> Result<()> {
-        for (name, part) in Summary::PARTS {
+        for (name, part) in Summary::STATISTICS {
             let value = |metric| self.comparison.get(metric).as_ref().and_then(part);
             self.line(out, (name, ""), |metric| (self.cell)(metric, value(metric)))?;
         }

@@ -75,7 +75,7 @@ fn same_size(a: &Image, b: &Image) -> Result<()> {
 mod tests {
     use super::testing::picture;
     use super::*;
-    use crate::metrics::lpips::{Network, Range, testing::random};
+    use crate::metrics::lpips::{Network, PixelRange, testing::random};
 
     #[test]
     fn pictures_with_nan_are_refused_by_every_metric() {
@@ -89,7 +89,7 @@ mod tests {
                 ssim(a, b).map(drop),
                 ssim_inner(a, b).map(drop),
                 flip(a, b).map(drop),
-                lpips.distance(a, b, Range::Standard).map(drop),
+                lpips.distance(a, b, PixelRange::Standard).map(drop),
             ];
             for said in said {
                 let said = said.unwrap_err().to_string();

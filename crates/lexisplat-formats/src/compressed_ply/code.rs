@@ -61,16 +61,16 @@ pub(super) fn to_three(values: [f32; 3], [low, high]: &Bounds) -> u32 {
 #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
 pub(super) fn rotation(code: u32) -> [f32; 4] {
     let place = (code >> 30) as usize;
-    let mut parts = [0.0_f64; 4];
+    let mut components = [0.0_f64; 4];
     let (mut left, mut squares) = (code, 0.0);
     for k in (0..4).rev().filter(|k| *k != place) {
         let share = f64::from(left & ((1 << TURN_BITS) - 1)) / most(TURN_BITS);
-        parts[k] = (share - TURN_HALF) * std::f64::consts::SQRT_2;
-        squares += parts[k] * parts[k];
+        components[k] = (share - TURN_HALF) * std::f64::consts::SQRT_2;
+        squares += components[k] * components[k];
         left >>= TURN_BITS;
     }
-    parts[place] = (1.0 - squares).max(0.0).sqrt();
-    parts.map(|v| v as f32)
+    components[place] = (1.0 - squares).max(0.0).sqrt();
+    components.map(|v| v as f32)
 }
 
 /// Returns the code of a rotation (w, x, y, z). The decoded rotation has the same code again.
@@ -81,19 +81,19 @@ pub(super) fn to_rotation(turn: [f32; 4]) -> u32 {
 fn once(turn: [f32; 4]) -> u32 {
     let wide = turn.map(f64::from);
     let length = wide.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let mut parts = if length > 0.0 { wide.map(|v| v / length) } else { [1.0, 0.0, 0.0, 0.0] };
+    let mut components = if length > 0.0 { wide.map(|v| v / length) } else { [1.0, 0.0, 0.0, 0.0] };
     let mut place = 0;
     for k in 1..4 {
-        if parts[k].abs() > parts[place].abs() {
+        if components[k].abs() > components[place].abs() {
             place = k;
         }
     }
-    if parts[place] < 0.0 {
-        parts = parts.map(|v| -v);
+    if components[place] < 0.0 {
+        components = components.map(|v| -v);
     }
     let mut code = u32::try_from(place).unwrap_or(0);
     for k in (0..4).filter(|k| *k != place) {
-        let share = parts[k] * std::f64::consts::FRAC_1_SQRT_2 + TURN_HALF;
+        let share = components[k] * std::f64::consts::FRAC_1_SQRT_2 + TURN_HALF;
         code = code << TURN_BITS | to_bits(share, TURN_BITS);
     }
     code

@@ -103,10 +103,10 @@ impl Accessor {
         if entry.sparse.is_some() {
             return Err(malformed("is sparse, which is not read".to_owned()));
         }
-        let Some(view) = entry.buffer_view else {
+        let Some(buffer_view) = entry.buffer_view else {
             return Err(malformed("has no bufferView".to_owned()));
         };
-        let (span, stride) = buffers.view(name, document, view)?;
+        let (span, stride) = buffers.buffer_view(name, document, buffer_view)?;
         let element = shape.numbers() * component.bytes();
         let stride = stride.unwrap_or(element as u64);
         if stride < element as u64 {
@@ -116,7 +116,7 @@ impl Accessor {
         let last = if entry.count == 0 { 0 } else { element as u64 };
         let end = entry.byte_offset.saturating_add(before_last).saturating_add(last);
         if end > span.length as u64 {
-            let text = format!("ends at byte {end} of bufferView {view}, which has {}", span.length);
+            let text = format!("ends at byte {end} of bufferView {buffer_view}, which has {}", span.length);
             return Err(malformed(text));
         }
         // All three values are at most the length of the span.

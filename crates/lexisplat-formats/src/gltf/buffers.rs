@@ -7,7 +7,7 @@ use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use lexisplat::{Error, FormatError, Result};
 
-use super::document::{Document, View};
+use super::document::{BufferView, Document};
 
 /// Base64 with or without padding at its end, because writers differ.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -17,7 +17,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 /// Largest number of characters of an address in a message.
 const SHOWN: usize = 64;
 
-/// The buffers of a file that are used by some views.
+/// The buffers of a file that are used by some bufferViews.
 #[derive(Debug)]
 pub(super) struct Buffers<'a> {
     bytes: Vec<Option<Cow<'a, [u8]>>>,
@@ -32,7 +32,7 @@ pub(super) struct Span {
 }
 
 impl<'a> Buffers<'a> {
-    /// Loads the buffers that the bufferViews `views` use.
+    /// Loads the buffers that the bufferViews `buffer_views` use.
     ///
     /// # Errors
     /// [`Error::Format`] for a buffer outside of the file, or of another length than stated.
@@ -40,11 +40,11 @@ impl<'a> Buffers<'a> {
         name: &str,
         document: &Document<'_>,
         bin: Option<&'a [u8]>,
-        views: impl Iterator<Item = usize>,
+        buffer_views: impl Iterator<Item = usize>,
     ) -> Result<Self> {
         let mut bytes: Vec<_> = document.buffers.iter().map(|_| None).collect();
-        for view in views {
-            let index = view_of(name, document, view)?.buffer;
+        for buffer_view in buffer_views {
+            let index = buffer_view_of(name, document, buffer_view)?.buffer;
             match bytes.get_mut(index) {
                 None => return Err(missing(name, "buffer", index)),
                 Some(Some(_)) => {}
@@ -54,27 +54,27 @@ impl<'a> Buffers<'a> {
         Ok(Self { bytes })
     }
 
-    /// Returns the bytes of bufferView `view`, and its stride.
+    /// Returns the bytes of bufferView `buffer_view`, and its stride.
     ///
     /// # Errors
     /// [`Error::Format`] if the bytes are not all in the buffer.
-    pub(super) fn view(
+    pub(super) fn buffer_view(
         &self,
         name: &str,
         document: &Document<'_>,
-        view: usize,
+        buffer_view: usize,
     ) -> Result<(Span, Option<u64>)> {
-        let entry = view_of(name, document, view)?;
+        let entry = buffer_view_of(name, document, buffer_view)?;
         let Some(Some(bytes)) = self.bytes.get(entry.buffer) else {
             return Err(missing(name, "buffer", entry.buffer));
         };
         let end = entry.byte_offset.saturating_add(entry.byte_length);
         let (Ok(start), Ok(end)) = (usize::try_from(entry.byte_offset), usize::try_from(end)) else {
-            return Err(Error::malformed(name, format!("bufferView {view} ends at byte {end}")));
+            return Err(Error::malformed(name, format!("bufferView {buffer_view} ends at byte {end}")));
         };
         if end > bytes.len() {
             let text = format!(
-                "bufferView {view} ends at byte {end}, and buffer {} has {}",
+                "bufferView {buffer_view} ends at byte {end}, and buffer {} has {}",
                 entry.buffer,
                 bytes.len()
             );
@@ -83,7 +83,7 @@ impl<'a> Buffers<'a> {
         Ok((Span { buffer: entry.buffer, start, length: end - start }, entry.byte_stride))
     }
 
-    /// Returns the bytes of `span`, which must come from [`Self::view`].
+    /// Returns the bytes of `span`, which must come from [`Self::buffer_view`].
     pub(super) fn get(&self, span: Span) -> &[u8] {
         let bytes = self.bytes.get(span.buffer).and_then(Option::as_deref).unwrap_or_default();
         bytes.get(span.start..).and_then(|rest| rest.get(..span.length)).unwrap_or_default()
@@ -95,8 +95,8 @@ pub(super) fn missing(name: &str, what: &str, index: usize) -> Error {
     Error::malformed(name, format!("{what} {index} does not exist"))
 }
 
-fn view_of<'d>(name: &str, document: &'d Document<'_>, view: usize) -> Result<&'d View> {
-    document.buffer_views.get(view).ok_or_else(|| missing(name, "bufferView", view))
+fn buffer_view_of<'d>(name: &str, document: &'d Document<'_>, buffer_view: usize) -> Result<&'d BufferView> {
+    document.buffer_views.get(buffer_view).ok_or_else(|| missing(name, "bufferView", buffer_view))
 }
 
 /// Returns the bytes of buffer `index`, which must exist.

@@ -1,4 +1,4 @@
-//! The parts of a glTF's JSON that tell where splats are.
+//! The members of a glTF's JSON that tell where splats are.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Largest text that counts as part of the header, in bytes. Longer texts are data in base64.
 const LONG_TEXT: usize = 1024;
 
-/// The parts of a glTF that are read. All others are ignored.
+/// The members of a glTF that are read. All others are ignored.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 pub(super) struct Document<'a> {
@@ -20,7 +20,7 @@ pub(super) struct Document<'a> {
     pub(super) nodes: Vec<Node>,
     pub(super) meshes: Vec<Mesh>,
     pub(super) accessors: Vec<AccessorEntry>,
-    pub(super) buffer_views: Vec<View>,
+    pub(super) buffer_views: Vec<BufferView>,
     #[serde(borrow)]
     pub(super) buffers: Vec<BufferEntry<'a>>,
 }
@@ -130,7 +130,7 @@ pub(super) enum Shape {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub(super) struct View {
+pub(super) struct BufferView {
     pub(super) buffer: usize,
     #[serde(default)]
     pub(super) byte_offset: u64,
@@ -168,7 +168,7 @@ fn structure(json: &[u8]) -> u64 {
 }
 
 impl<'a> Document<'a> {
-    /// Reads the `json` of the file called `name`. Ignored parts may be nested to any depth, because they are skipped
+    /// Reads the `json` of the file called `name`. Ignored members may be nested to any depth, because they are skipped
     /// without recursion.
     ///
     /// # Errors

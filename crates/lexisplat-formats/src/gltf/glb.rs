@@ -108,7 +108,7 @@ mod tests {
         let chunks = Chunks::read("a", &bytes).unwrap();
         assert_eq!((chunks.json, chunks.bin), (&b"{}  "[..], Some(&b"5678"[..])));
         assert!(chunks.warnings[0].contains("'what'"));
-        // What follows the glb does not belong to it.
+        // Bytes after the glb do not belong to it.
         let longer = [&bytes[..], b"rest"].concat();
         assert_eq!(Chunks::read("a", &longer).unwrap().bin, Some(&b"5678"[..]));
     }

@@ -30,7 +30,7 @@ pub(super) struct Root {
     nodes: [Node; 1],
     meshes: [Mesh; 1],
     accessors: Vec<AccessorOut>,
-    buffer_views: Vec<ViewOut>,
+    buffer_views: Vec<BufferViewOut>,
     buffers: [BufferOut; 1],
 }
 
@@ -84,12 +84,12 @@ struct SplattingOut {
 #[derive(Debug, Serialize)]
 struct SpzOut {
     #[serde(rename = "KHR_gaussian_splatting_compression_spz_2")]
-    spz: SpzView,
+    spz: SpzBufferView,
 }
 
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
-struct SpzView {
+struct SpzBufferView {
     buffer_view: usize,
 }
 
@@ -112,7 +112,7 @@ struct AccessorOut {
 
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "camelCase")]
-struct ViewOut {
+struct BufferViewOut {
     buffer: usize,
     byte_offset: usize,
     byte_length: usize,
@@ -163,18 +163,23 @@ impl Root {
         bounds: [[f32; 3]; 2],
         spz: Option<usize>,
     ) -> Self {
-        let mut views = Vec::new();
+        let mut buffer_views = Vec::new();
         let mut accessors = Vec::with_capacity(attributes.len());
         let mut end = 0;
         if let Some(byte_length) = spz {
-            views.push(ViewOut { buffer: 0, byte_offset: 0, byte_length, target: None });
+            buffer_views.push(BufferViewOut { buffer: 0, byte_offset: 0, byte_length, target: None });
             end = byte_length;
         }
         for (k, attribute) in attributes.iter().enumerate() {
-            let buffer_view = spz.is_none().then_some(views.len());
+            let buffer_view = spz.is_none().then_some(buffer_views.len());
             if buffer_view.is_some() {
                 let byte_length = count * attribute.width();
-                views.push(ViewOut { buffer: 0, byte_offset: end, byte_length, target: Some(ARRAY_BUFFER) });
+                buffer_views.push(BufferViewOut {
+                    buffer: 0,
+                    byte_offset: end,
+                    byte_length,
+                    target: Some(ARRAY_BUFFER),
+                });
                 end += byte_length;
             }
             let [min, max] = bounds.map(|bound| (k == 0).then_some(bound));
@@ -196,7 +201,7 @@ impl Root {
             color_space: "srgb_rec709_display",
             projection: "perspective",
             sorting_method: "cameraDistance",
-            extensions: spz.map(|_| SpzOut { spz: SpzView { buffer_view: 0 } }),
+            extensions: spz.map(|_| SpzOut { spz: SpzBufferView { buffer_view: 0 } }),
         };
         let extensions = PrimitiveExtensionsOut { splatting };
         let primitive = PrimitiveOut { attributes: attributes.collect(), mode: POINTS, extensions };
@@ -210,7 +215,7 @@ impl Root {
             nodes: [Node { mesh: 0, translation: None }],
             meshes: [Mesh { primitives: [primitive] }],
             accessors,
-            buffer_views: views,
+            buffer_views,
             buffers: [BufferOut { byte_length: end }],
         }
     }

@@ -70,8 +70,8 @@ pub(crate) fn read<'a>(name: &str, bytes: &'a [u8], options: &ReadOptions) -> Re
     }
     let shown = nodes::shown(name, &document)?;
     let found = primitive::find(name, &document, &shown, &mut warnings)?;
-    let views = found.iter().flat_map(|found| found.views(&document));
-    let buffers = Buffers::load(name, &document, chunks.bin, views)?;
+    let buffer_views = found.iter().flat_map(|found| found.buffer_views(&document));
+    let buffers = Buffers::load(name, &document, chunks.bin, buffer_views)?;
     let mut scene = Scene::new(buffers);
     let file_bytes = bytes.len() as u64;
     scene.add_all(name, &document, &found, file_bytes, options, &mut warnings)?;

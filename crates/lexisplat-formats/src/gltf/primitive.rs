@@ -32,7 +32,7 @@ pub(super) enum Source {
     /// order of one channel.
     Plain { geometry: [usize; 5], rest: Vec<usize>, degree: ShDegree },
     /// An SPZ in a bufferView, and its number of Gaussians according to the accessor of positions.
-    Spz { view: usize, count: Option<u64> },
+    Spz { buffer_view: usize, count: Option<u64> },
 }
 
 /// A splat primitive that a node shows.
@@ -46,11 +46,13 @@ pub(super) struct Found {
 
 impl Found {
     /// Returns the bufferViews that the primitive needs.
-    pub(super) fn views(&self, document: &Document<'_>) -> Vec<usize> {
-        let view = |accessor: &usize| document.accessors.get(*accessor)?.buffer_view;
+    pub(super) fn buffer_views(&self, document: &Document<'_>) -> Vec<usize> {
+        let buffer_view = |accessor: &usize| document.accessors.get(*accessor)?.buffer_view;
         match &self.source {
-            Source::Plain { geometry, rest, .. } => geometry.iter().chain(rest).filter_map(view).collect(),
-            Source::Spz { view, .. } => vec![*view],
+            Source::Plain { geometry, rest, .. } => {
+                geometry.iter().chain(rest).filter_map(buffer_view).collect()
+            }
+            Source::Spz { buffer_view, .. } => vec![*buffer_view],
         }
     }
 }
@@ -157,7 +159,7 @@ fn source(
         return Ok(Some((plain(name, label, primitive, warnings)?, [false; 3])));
     };
     let position = primitive.attributes.get("POSITION").and_then(|&k| document.accessors.get(k));
-    let source = Source::Spz { view: spz.buffer_view, count: position.map(|accessor| accessor.count) };
+    let source = Source::Spz { buffer_view: spz.buffer_view, count: position.map(|accessor| accessor.count) };
     // Reading an SPZ turns it to the axes of a trainer's PLY. Files of the drafts have glTF's axes where SPZ has its own
     // axes.
     let is_draft = nested.is_none() || splatting.is_none_or(is_draft);

@@ -37,9 +37,9 @@ enum Splats {
 }
 
 /// The splats of a primitive with their place.
-struct Part {
-    /// Number of the part's first Gaussian, and of the first Gaussian after the part.
-    range: Range<usize>,
+struct PlacedSplats {
+    /// Numbers of the Gaussians.
+    gaussians: Range<usize>,
     splats: Splats,
     place: Place,
 }
@@ -47,41 +47,41 @@ struct Part {
 /// The splats of all primitives.
 pub(super) struct Scene<'a> {
     buffers: Buffers<'a>,
-    parts: Vec<Part>,
-    /// Highest SH degree of all parts.
+    primitives: Vec<PlacedSplats>,
+    /// Highest SH degree of all primitives.
     degree: ShDegree,
 }
 
 impl fmt::Debug for Scene<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Scene").field("parts", &self.parts.len()).finish_non_exhaustive()
+        f.debug_struct("Scene").field("primitives", &self.primitives.len()).finish_non_exhaustive()
     }
 }
 
 impl<'a> Scene<'a> {
     pub(super) fn new(buffers: Buffers<'a>) -> Self {
-        Self { buffers, parts: Vec::new(), degree: ShDegree::ZERO }
+        Self { buffers, primitives: Vec::new(), degree: ShDegree::ZERO }
     }
 
     /// Returns the number of Gaussians.
     pub(super) fn len(&self) -> usize {
-        self.parts.last().map_or(0, |part| part.range.end)
+        self.primitives.last().map_or(0, |one| one.gaussians.end)
     }
 
-    /// Returns the highest SH degree of all parts.
+    /// Returns the highest SH degree of all primitives.
     pub(super) fn degree(&self) -> ShDegree {
         self.degree
     }
 
-    /// Returns whether all parts have the mark of anti-aliasing, which only an SPZ can have.
+    /// Returns whether all primitives have the mark of anti-aliasing, which only an SPZ can have.
     pub(super) fn is_antialiased(&self) -> bool {
-        self.parts.iter().all(|part| matches!(&part.splats, Splats::Packed(packed) if packed.antialiased))
+        self.primitives.iter().all(|one| matches!(&one.splats, Splats::Packed(packed) if packed.antialiased))
     }
 
-    /// Subtracts the translation of the first part from all parts and returns it, if single precision is too coarse at
-    /// this distance from the origin for the sizes of the first Gaussians.
+    /// Subtracts the translation of the first primitive from all primitives and returns it, if single precision is too
+    /// coarse at this distance from the origin for the sizes of the first Gaussians.
     pub(super) fn settle_offset(&mut self) -> Option<Offset> {
-        let translation = self.parts.first()?.place.translation();
+        let translation = self.primitives.first()?.place.translation();
         let offset = Offset::new(translation).ok()??;
         let most = translation.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         let n = self.len().min(SAMPLE);
@@ -102,7 +102,7 @@ impl<'a> Scene<'a> {
         if !rounding.is_coarse() {
             return None;
         }
-        self.parts.iter_mut().for_each(|part| part.place.rebase(offset));
+        self.primitives.iter_mut().for_each(|one| one.place.rebase(offset));
         Some(offset)
     }
 
@@ -131,17 +131,17 @@ impl<'a> Scene<'a> {
                     let len = accessors.len();
                     (Splats::Plain(Box::new(accessors)), len, *degree)
                 }
-                Source::Spz { view, count } => {
-                    let packed = match packed.get(view) {
+                Source::Spz { buffer_view, count } => {
+                    let packed = match packed.get(buffer_view) {
                         Some(packed) => packed.clone(),
                         None => {
-                            let (span, _) = self.buffers.view(name, document, *view)?;
+                            let (span, _) = self.buffers.buffer_view(name, document, *buffer_view)?;
                             packed_bytes += span.length as u64;
                             if packed_bytes > file_bytes {
                                 return Err(Error::malformed(name, "bufferViews of SPZs overlap"));
                             }
                             let new = unpack(name, found, self.buffers.get(span), options, warnings)?;
-                            packed.entry(*view).or_insert(new).clone()
+                            packed.entry(*buffer_view).or_insert(new).clone()
                         }
                     };
                     if let Some(count) = count.filter(|count| *count != packed.len as u64) {
@@ -158,7 +158,7 @@ impl<'a> Scene<'a> {
             let start = self.len();
             options.limits.check_gaussians(name, (start as u64).saturating_add(len as u64))?;
             self.degree = self.degree.max(degree);
-            self.parts.push(Part { range: start..start + len, splats, place: found.place });
+            self.primitives.push(PlacedSplats { gaussians: start..start + len, splats, place: found.place });
         }
         Ok(())
     }
@@ -185,16 +185,17 @@ fn unpack(
 impl Rows for Scene<'_> {
     fn fill(&self, range: Range<usize>, mut out: RowsMut<'_>) {
         let degree = self.degree();
-        let first = self.parts.partition_point(|part| part.range.end <= range.start);
-        for part in self.parts.iter().skip(first).take_while(|part| part.range.start < range.end) {
-            let [start, end] = [range.start, range.end].map(|k| k.clamp(part.range.start, part.range.end));
-            let local = start - part.range.start..end - part.range.start;
+        let first = self.primitives.partition_point(|one| one.gaussians.end <= range.start);
+        for one in self.primitives.iter().skip(first).take_while(|one| one.gaussians.start < range.end) {
+            let [start, end] =
+                [range.start, range.end].map(|k| k.clamp(one.gaussians.start, one.gaussians.end));
+            let local = start - one.gaussians.start..end - one.gaussians.start;
             let mut out = out.take(local.len(), degree.rest());
-            match &part.splats {
+            match &one.splats {
                 Splats::Plain(accessors) => accessors.fill(&self.buffers, local, degree, out.reborrow()),
                 Splats::Packed(packed) => packed.fill(local, degree, out.reborrow()),
             }
-            part.place.apply(degree, out);
+            one.place.apply(degree, out);
         }
     }
 

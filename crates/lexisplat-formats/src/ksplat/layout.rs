@@ -126,7 +126,7 @@ pub(super) struct Layout<'a> {
     /// Highest SH degree of the sections.
     pub(super) degree: ShDegree,
     /// SH values of bytes 0 and 255.
-    pub(super) sh_range: [f32; 2],
+    pub(super) sh_bounds: [f32; 2],
     pub(super) sections: Vec<Section<'a>>,
 }
 
@@ -146,7 +146,7 @@ impl<'a> Layout<'a> {
         let headers = size(u32_at(header, 4)).saturating_mul(SECTION_HEADER);
         let headers = take(name, "the headers of sections", bytes, &mut rest, headers)?;
         let or = |value: f32, default: f32| if value == 0.0 { default } else { value };
-        let sh_range = [or(f32_at(header, 36), -DEFAULT_SH), or(f32_at(header, 40), DEFAULT_SH)];
+        let sh_bounds = [or(f32_at(header, 36), -DEFAULT_SH), or(f32_at(header, 40), DEFAULT_SH)];
         let mut sections = Vec::new();
         let mut gaussians = 0_usize;
         for (s, header) in headers.as_chunks::<SECTION_HEADER>().0.iter().enumerate() {
@@ -162,7 +162,7 @@ impl<'a> Layout<'a> {
         }
         let degree = sections.iter().map(|section| section.degree).max().unwrap_or(ShDegree::ZERO);
         let version = format!("{major}.{minor}");
-        Ok(Self { version, level, gaussians, degree, sh_range, sections })
+        Ok(Self { version, level, gaussians, degree, sh_bounds, sections })
     }
 }
 

@@ -146,7 +146,7 @@ fn sh(layout: &Layout<'_>, degree: ShDegree, reader: RowReader<'_>, out: &mut [f
     for n in IN_DEGREE.into_iter().take(degree.get().into()) {
         for c in 0..3 {
             for k in 0..n {
-                out[c * channel + first + k] = reader.sh(value, layout.sh_range);
+                out[c * channel + first + k] = reader.sh(value, layout.sh_bounds);
                 value += 1;
             }
         }

@@ -6,9 +6,9 @@ pub(super) const LEVELS: usize = 256;
 pub(super) const MOST_CODE: f64 = 65_535.0;
 /// Largest byte.
 const MOST_BYTE: f64 = 255.0;
-/// Value of the fourth byte of a rotation whose largest part is w. The values for x, y and z follow.
+/// Value of the fourth byte of a rotation whose largest component is w. The values for x, y and z follow.
 pub(super) const FIRST_MODE: u8 = 252;
-/// Indices of the three other parts for each largest part, of (w, x, y, z).
+/// Indices of the three other components for each largest component, of (w, x, y, z).
 const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 
 /// Returns the value at `share` between `low` and `high`.
@@ -47,11 +47,11 @@ pub(super) fn rotation([a, b, c, mode]: [u8; 4]) -> [f32; 4] {
     let Some(largest) = mode.checked_sub(FIRST_MODE).map(usize::from) else {
         return [1.0, 0.0, 0.0, 0.0];
     };
-    let parts = [a, b, c].map(|v| (f64::from(v) / MOST_BYTE * 2.0 - 1.0) / std::f64::consts::SQRT_2);
-    let rest = 1.0 - parts.iter().map(|v| v * v).sum::<f64>();
+    let components = [a, b, c].map(|v| (f64::from(v) / MOST_BYTE * 2.0 - 1.0) / std::f64::consts::SQRT_2);
+    let rest = 1.0 - components.iter().map(|v| v * v).sum::<f64>();
     let mut turn = [rest.max(0.0).sqrt() as f32; 4];
-    for (at, part) in OTHERS[largest].into_iter().zip(parts) {
-        turn[at] = part as f32;
+    for (at, component) in OTHERS[largest].into_iter().zip(components) {
+        turn[at] = component as f32;
     }
     turn
 }
@@ -98,7 +98,7 @@ mod tests {
             let length: f32 = turn.iter().map(|v| v * v).sum::<f32>().sqrt();
             let dot: f32 = turn.iter().zip(found).map(|(a, b)| a / length * b).sum();
             assert!(dot.abs() > 0.9999, "{turn:?} {found:?}");
-            // Where two parts are nearly the largest, rounding may swap them.
+            // Where two components are nearly the largest, rounding may swap them.
             let again = rotation(to_rotation(found));
             let dot: f32 = again.iter().zip(found).map(|(a, b)| a * b).sum();
             assert!(dot.abs() > 0.9999, "{turn:?} {found:?} {again:?}");

@@ -3,7 +3,7 @@
 //!
 //! A pixel of each picture belongs to a Gaussian. Positions have 16 bits along each axis, in two pictures. They are
 //! between ends that `meta.json` has as logarithms. Scales and colours are indices into lists of 256 values. Rotations
-//! are their three smallest parts. SH are indices into a palette, which is a picture too. Version 1 has equal steps
+//! are their three smallest components. SH are indices into a palette, which is a picture too. Version 1 has equal steps
 //! between two ends instead of lists. It can be read, but is not written.
 
 mod archive;

@@ -108,7 +108,7 @@ impl Groups {
         let means = tree::split(entries, count, progress)?;
         let of_means = Rows { values: &means, width: entries.width };
         let mut nearest = vec![0_u32; entries.len()];
-        each_part(&mut nearest, progress, |first, nearest| {
+        each_chunk(&mut nearest, progress, |first, nearest| {
             for (i, nearest) in (first..).zip(nearest) {
                 let row = entries.get(i);
                 *nearest = best((0_u32..).zip(of_means.values.chunks_exact(entries.width)), row).0;
@@ -162,9 +162,9 @@ fn best<'a>(rows: impl Iterator<Item = (u32, &'a [f32])>, row: &[f32]) -> (u32, 
 fn assign(rows: Rows<'_>, entries: &[f32], labels: &mut [u32], progress: &dyn Progress) -> Result<Vec<f32>> {
     let groups = Groups::new(Rows { values: entries, width: rows.width }, progress)?;
     let mut found: Vec<(u32, f32)> = vec![(0, 0.0); rows.len()];
-    each_part(&mut found, progress, |first, part| {
+    each_chunk(&mut found, progress, |first, chunk| {
         let mut order = Vec::new();
-        for (i, found) in (first..).zip(part) {
+        for (i, found) in (first..).zip(chunk) {
             *found = groups.nearest(rows.get(i), &mut order);
         }
     })?;
@@ -198,25 +198,25 @@ fn update(rows: Rows<'_>, labels: &[u32], distances: &[f32], entries: &mut [f32]
     }
 }
 
-/// Processes parts of `items`, on all cores if there are threads. The function gets the index of the first item of a
-/// part. Once `progress` cancels, no further parts are begun.
-fn each_part<T: Send>(
+/// Processes `items` in chunks, on all cores if there are threads. `work` gets the index of the first item of a chunk. Once
+/// `progress` cancels, no further chunks are begun.
+fn each_chunk<T: Send>(
     items: &mut [T],
     progress: &dyn Progress,
     work: impl Fn(usize, &mut [T]) + Sync,
 ) -> Result<()> {
-    let part = |(k, part): (usize, &mut [T])| {
+    let task = |(k, chunk): (usize, &mut [T])| {
         progress.check()?;
-        work(k * ROWS_PER_TASK, part);
+        work(k * ROWS_PER_TASK, chunk);
         Ok(())
     };
     #[cfg(feature = "parallel")]
     {
         use rayon::prelude::*;
-        items.par_chunks_mut(ROWS_PER_TASK).enumerate().try_for_each(part)
+        items.par_chunks_mut(ROWS_PER_TASK).enumerate().try_for_each(task)
     }
     #[cfg(not(feature = "parallel"))]
-    items.chunks_mut(ROWS_PER_TASK).enumerate().try_for_each(part)
+    items.chunks_mut(ROWS_PER_TASK).enumerate().try_for_each(task)
 }
 
 #[cfg(test)]

@@ -25,16 +25,16 @@ fn unit([w, x, y, z]: [f32; 4]) -> [f32; 4] {
 /// sign and magnitude of the others (`packQuaternionSmallestThree`).
 pub(super) fn smallest_three(code: u32) -> [f32; 4] {
     let place = (code >> (3 * (BITS + 1))) as usize;
-    let mut parts = [0.0; 4];
+    let mut components = [0.0; 4];
     let (mut left, mut squares) = (code, 0.0);
     for k in (0..4).rev().filter(|k| *k != place) {
         let size = LARGEST * (left & MASK) as f32 / MASK as f32;
-        parts[k] = if left >> BITS & 1 == 1 { -size } else { size };
+        components[k] = if left >> BITS & 1 == 1 { -size } else { size };
         squares += size * size;
         left >>= BITS + 1;
     }
-    parts[place] = (1.0_f32 - squares).max(0.0).sqrt();
-    let [x, y, z, w] = parts;
+    components[place] = (1.0_f32 - squares).max(0.0).sqrt();
+    let [x, y, z, w] = components;
     [w, x, y, z]
 }
 
@@ -45,19 +45,19 @@ pub(super) fn to_smallest_three(rotation: [f32; 4]) -> u32 {
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a magnitude of 9 bits")]
 fn once(rotation: [f32; 4]) -> u32 {
-    let parts = unit(rotation);
+    let components = unit(rotation);
     let mut place = 0;
     for k in 1..4 {
-        if parts[k].abs() > parts[place].abs() {
+        if components[k].abs() > components[place].abs() {
             place = k;
         }
     }
-    let negate = parts[place] < 0.0;
+    let negate = components[place] < 0.0;
     let mut code = place as u32;
     for k in (0..4).filter(|k| *k != place) {
-        let size = (parts[k].abs() / LARGEST * MASK as f32).round().min(MASK as f32) as u32;
+        let size = (components[k].abs() / LARGEST * MASK as f32).round().min(MASK as f32) as u32;
         // A component of 0 has no negative sign.
-        let negative = size > 0 && (parts[k] < 0.0) != negate;
+        let negative = size > 0 && (components[k] < 0.0) != negate;
         code = code << (BITS + 1) | u32::from(negative) << BITS | size;
     }
     code

@@ -163,8 +163,8 @@ impl<'a> PictureAdjoint<'a> {
                         },
                     )
                 },
-                |gaussian, part: [f32; N]| {
-                    sums[gaussian].iter_mut().zip(part).for_each(|(sum, value)| *sum += value * share);
+                |gaussian, values: [f32; N]| {
+                    sums[gaussian].iter_mut().zip(values).for_each(|(sum, value)| *sum += value * share);
                 },
             );
             progress.advance(1);

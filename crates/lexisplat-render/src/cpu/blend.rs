@@ -295,7 +295,7 @@ fn blend<const BACKGROUND: bool>(block: &mut Block, splat: &Splat, alpha: &Lanes
     (changed != 0, still_open == 0)
 }
 
-/// The parts of a splat's exponents that all blocks of a column share.
+/// The terms of a splat's exponents that all blocks of a column share.
 struct Across {
     /// The xx of the conic times the squared distance in x.
     squared: Lanes,

@@ -26,7 +26,8 @@ pub(crate) fn carry(
     let simd = Simd::current();
     let [whole, drawn] = projection.pixel_counts();
     #[expect(clippy::cast_precision_loss, reason = "a count of views, to single precision")]
-    let [alone, share] = [(whole, 1), (drawn, views)].map(|(n, views)| 1.0 / (n * CHANNELS * views as f32));
+    let [own, mean] = [(whole, 1), (drawn, views)].map(|(n, views)| 1.0 / (n * CHANNELS * views as f32));
+    let weights = PixelWeights { own, mean };
     let Sensitivity { position, scale, rotation, opacity, colour, removal, removal_view, .. } = total;
     let tasks: Vec<Task<'_>> = moments
         .chunks_mut(GAUSSIANS_PER_TASK)
@@ -41,12 +42,21 @@ pub(crate) fn carry(
             Task { moments, position, scale, rotation, opacity, colour, removal, removal_view }
         })
         .collect();
-    tasks.into_par_iter().enumerate().for_each(|(task, mut part)| {
+    tasks.into_par_iter().enumerate().for_each(|(task, mut gaussians)| {
         simd.dispatch(
             #[inline(always)]
-            || part.carry(projection, geometry, task * GAUSSIANS_PER_TASK, [alone, share]),
+            || gaussians.carry(projection, geometry, task * GAUSSIANS_PER_TASK, weights),
         );
     });
+}
+
+/// The weights of a pixel of a picture.
+#[derive(Clone, Copy)]
+struct PixelWeights {
+    /// In the mean of the pixels of the picture.
+    own: f32,
+    /// In the mean of the pixels of all pictures.
+    mean: f32,
 }
 
 /// The moments and sensitivities of consecutive Gaussians.
@@ -62,16 +72,9 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Carries the moments of the Gaussians from `first` on over to the world. Sums over pixels are multiplied by the
-    /// weight of a pixel in its own picture and in the mean of all pictures.
+    /// Carries the moments of the Gaussians from `first` on over to the world.
     #[inline(always)]
-    fn carry(
-        &mut self,
-        projection: &Projection,
-        geometry: &Geometry,
-        first: usize,
-        [alone, share]: [f32; 2],
-    ) {
+    fn carry(&mut self, projection: &Projection, geometry: &Geometry, first: usize, weights: PixelWeights) {
         let count = self.moments.len();
         for start in (0..count).step_by(LANES) {
             let group = start..count.min(start + LANES);
@@ -91,12 +94,12 @@ impl Task<'_> {
                 if m.sums[0] <= 0.0 || !changes.is_finite(lane) {
                     continue;
                 }
-                self.colour[i] += m.sums[0] * share;
-                self.opacity[i] += m.sums[1] * share;
-                self.removal_view[i] = self.removal_view[i].max(m.sums[1] * alone);
+                self.colour[i] += m.sums[0] * weights.mean;
+                self.opacity[i] += m.sums[1] * weights.mean;
+                self.removal_view[i] = self.removal_view[i].max(m.sums[1] * weights.own);
                 let to = |sums: &mut [f32], values: &[Lanes]| {
                     for (sum, values) in sums.iter_mut().zip(values) {
-                        *sum += values[lane] * share;
+                        *sum += values[lane] * weights.mean;
                     }
                 };
                 to(&mut self.position[i], &changes.position);

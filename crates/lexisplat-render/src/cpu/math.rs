@@ -7,7 +7,7 @@ const EXP_MIN: f32 = -87.0;
 const EXP_MAX: f32 = 88.0;
 /// 1.5 * 2^23: adding and subtracting it rounds to the nearest integer.
 const ROUND: f32 = 12_582_912.0;
-/// ln 2 in two parts. The first part has so few bits that its multiples are exact (Cephes `expf`).
+/// ln 2 as a sum of two terms. The first has so few bits that its multiples are exact (Cephes `expf`).
 const LN2_HIGH: f32 = 0.693_359_4;
 const LN2_LOW: f32 = -2.121_944_4e-4;
 /// exp(r) = 1 + r + r^2 P(r) on [-ln 2 / 2, ln 2 / 2], highest power first (Cephes `expf`).

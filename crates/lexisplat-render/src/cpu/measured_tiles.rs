@@ -62,15 +62,15 @@ pub(super) fn measure_tiles<T: Send>(
                 entries += lists.len(tiles[end].0);
                 end += 1;
             }
-            let parts: Vec<Vec<(u32, T)>> = (first..end)
+            let measured: Vec<Vec<(u32, T)>> = (first..end)
                 .into_par_iter()
                 .map(|k| {
                     let (tile, place) = tiles[k];
                     pool.with(|scratch| measure(&visible.slots, lists.of(tile), place, scratch))
                 })
                 .collect();
-            for (gaussian, part) in parts.into_iter().flatten() {
-                add(gaussian as usize, part);
+            for (gaussian, value) in measured.into_iter().flatten() {
+                add(gaussian as usize, value);
             }
             first = end;
         }

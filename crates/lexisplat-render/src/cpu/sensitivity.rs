@@ -61,6 +61,6 @@ fn measure(
         |splats, list, tile, Scratch { canvas, trace }| {
             moments::tile(simd, splats, list, tile, canvas, trace)
         },
-        |gaussian, part| sums[gaussian].add(&part),
+        |gaussian, moments| sums[gaussian].add(&moments),
     );
 }

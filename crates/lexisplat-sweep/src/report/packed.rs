@@ -218,7 +218,7 @@ pub(super) fn views(report: &Report<'_>) -> Markup {
             [view.name.clone(), format!("{}\u{d7}{}", view.width, view.height)].into_iter().chain(scores),
         )
     }));
-    table.push_block(Summary::PARTS.map(|(name, part)| {
+    table.push_block(Summary::STATISTICS.map(|(name, part)| {
         let scores = files
             .iter()
             .flat_map(|file| [numbers::number(part(&file.psnr), 2), numbers::number(part(&file.ssim), 5)]);

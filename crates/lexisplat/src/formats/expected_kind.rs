@@ -1,11 +1,11 @@
-//! Refuses files of another kind than is to be read.
+//! Refusal of files of another kind than the expected one.
 
 use super::kind::FileKind;
 use crate::support::error::{Error, FormatError, Result};
 
 impl FileKind {
     /// Refuses the file called `name` if its `bytes` are of another kind than `self`. A .lexi begins with a length, so
-    /// a file of unknown kind may be a damaged one. It passes, and its reader says what is wrong with it.
+    /// a file of unknown kind may be a damaged .lexi. It passes, and the error of its reader is better.
     pub(crate) fn expect(self, name: &str, bytes: &[u8]) -> Result<()> {
         let problem = match Self::of(name, bytes) {
             Self::Unsupported(kind) => FormatError::Unsupported { kind },

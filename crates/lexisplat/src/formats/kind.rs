@@ -1,21 +1,21 @@
-//! What kind of file some bytes begin.
+//! The kind of a file, recognised by its first bytes and its name.
 
 use std::fmt;
 
-/// Extension of the files that [`Unsupported::Splat`] means. Their bytes have no mark.
+/// Extension of the files of [`Unsupported::Splat`]. Their bytes have no mark.
 const SPLAT_EXTENSION: &str = ".splat";
-/// Extension of the files that [`Unsupported::Ksplat`] means. Their bytes have no mark.
+/// Extension of the files of [`Unsupported::Ksplat`]. Their bytes have no mark.
 const KSPLAT_EXTENSION: &str = ".ksplat";
 /// Extension of .lexi files.
 const LEXI_EXTENSION: &str = ".lexi";
-/// What to do with a scene of another format where this crate alone reads.
+/// Advice for a scene of another format, in programs that read with this crate alone.
 const CONVERT: &str = "'lexisplat convert' makes a PLY of it, and the crate lexisplat-formats reads it";
 /// The mark of UTF-8 that some editors put before text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-/// Where the JSON header of a safetensors file begins: after its length, a u64.
+/// The place of the JSON header in a safetensors file: after its length, a u64.
 const JSON_OFFSET: usize = 8;
 
-/// `bytes` without the mark of UTF-8 that some editors put before text.
+/// Returns `bytes` without the mark of UTF-8 that some editors put before text.
 #[must_use]
 pub fn without_byte_order_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes)
@@ -29,21 +29,21 @@ pub enum FileKind {
     Ply,
     /// A .lexi, or another safetensors file.
     Lexi,
-    /// A known kind that this crate does not read.
+    /// A file of a known kind that this crate does not read.
     Unsupported(Unsupported),
     /// A file without bytes.
     Empty,
-    /// None of these.
+    /// A file of another kind.
     Unknown,
 }
 
-/// A kind of file that people mistake for a scene this crate reads.
+/// A kind of file that users mistake for a scene that this crate reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unsupported {
-    /// Anything gzip compressed. SPZ before version 4 is.
+    /// A file that gzip compressed, such as an SPZ before version 4.
     Gzip,
-    /// A zip archive. SOG is one.
+    /// A zip archive, such as a SOG.
     Zip,
     /// SPZ, version 4.
     Spz,
@@ -62,7 +62,7 @@ pub enum Unsupported {
 }
 
 impl FileKind {
-    /// The kind of the file called `name` that begins with `bytes`.
+    /// Returns the kind of the file called `name` that begins with `bytes`.
     #[must_use]
     pub fn of(name: &str, bytes: &[u8]) -> Self {
         let bytes = without_byte_order_mark(bytes);
@@ -72,7 +72,7 @@ impl FileKind {
             [b'p', b'l', b'y', b'\n' | b'\r' | b' ' | b'\t', ..] => return Self::Ply,
             [b'P', b'K', 3, 4, ..] => Unsupported::Zip,
             [b'N', b'G', b'S', b'P', ..] => Unsupported::Spz,
-            // The length before it may have any low bytes, so this comes before the marks of two bytes.
+            // The length of the header may have any low bytes, so this test comes before those of marks of two bytes.
             bytes if bytes.get(JSON_OFFSET) == Some(&b'{') && (is_length(bytes) || named(LEXI_EXTENSION)) => {
                 return Self::Lexi;
             }
@@ -88,7 +88,7 @@ impl FileKind {
 }
 
 /// Returns whether the first 8 bytes can be the length of a safetensors header: a u64 below 2^32. The first 8 bytes of a
-/// .splat are two floats, which are such a length only where the second is 0.
+/// .splat are two floats. They are such a length only if the second is 0.
 fn is_length(bytes: &[u8]) -> bool {
     bytes.get(4..JSON_OFFSET) == Some(&[0; 4])
 }
@@ -106,7 +106,7 @@ impl fmt::Display for FileKind {
 }
 
 impl Unsupported {
-    /// What it is, and what to do instead of reading it.
+    /// Returns a description of the kind with advice, for a message.
     fn texts(self) -> [&'static str; 2] {
         match self {
             Self::Gzip => ["a gzip file (SPZ?)", CONVERT],
@@ -131,7 +131,7 @@ impl Unsupported {
         }
     }
 
-    /// What to do instead of reading the file.
+    /// Returns advice for the user, who cannot read the file.
     #[must_use]
     pub fn advice(self) -> &'static str {
         self.texts()[1]

@@ -5,7 +5,7 @@
 //! mathematics, docs/FORMAT.md the bytes.
 //!
 //! `encode/` is the encoder and `decode/` the decoder. `bitstream/` is the syntax that they share, `entropy/` the coder of
-//! its symbols. One function both encodes and decodes a part of the syntax, for instance in `bitstream/geometry_syntax.rs`.
+//! its symbols. One function both encodes and decodes a syntax element, for instance in `bitstream/geometry_syntax.rs`.
 //! It is generic over a type that writes symbols or reads them.
 
 mod bitstream;

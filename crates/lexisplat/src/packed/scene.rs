@@ -12,7 +12,7 @@ use crate::support::spill::{Spilled, Woven};
 /// The file name in errors about a packed scene that was not read from a file.
 pub(super) const UNNAMED: &str = "the packed scene";
 
-/// The parts of a packed scene whose size does not depend on the number of Gaussians.
+/// The head of a packed scene: everything whose size does not depend on the number of Gaussians.
 #[derive(Debug, Clone)]
 pub struct PackedHead {
     /// The file name, as the caller gave it. It is used in errors.
@@ -29,7 +29,7 @@ pub struct PackedHead {
     pub record: Record,
     /// Comments and marks of the source.
     pub meta: SceneMeta,
-    /// The quality or the size that a search asked for, and what it reached. `None` without a search.
+    /// The target of a search and its result. `None` without a search.
     pub target: Option<TargetRecord>,
     /// The quality of the file in the views that judged it. `None` if no view did.
     pub reached: Option<ReachedRecord>,
@@ -37,7 +37,7 @@ pub struct PackedHead {
     pub device: Option<String>,
     /// The tensor `packed.head`: the parameters of the decoder and the index of chunks; see `bitstream/head.rs`.
     pub(crate) bytes: Vec<u8>,
-    /// Limits on what a reader may make of the scene: those of its reader, or the default ones.
+    /// The limits of the reader of the scene, or the default limits.
     pub(crate) limits: Limits,
 }
 
@@ -68,7 +68,7 @@ impl Packed {
         Self { head, extras, order, data }
     }
 
-    /// Returns the parts whose size does not depend on the number of Gaussians.
+    /// Returns the head.
     #[must_use]
     pub fn head(&self) -> &PackedHead {
         &self.head
@@ -104,14 +104,14 @@ impl Packed {
         &self.data
     }
 
-    /// Replaces the record of what a search asked for and reached.
+    /// Replaces the record of a search: its target and its result.
     #[must_use]
     pub fn with_target(mut self, target: impl Into<Option<TargetRecord>>) -> Self {
         self.head.target = target.into();
         self
     }
 
-    /// Replaces the record of what views showed of the file.
+    /// Replaces the record of the quality in the views that judged the file.
     #[must_use]
     pub fn with_reached(mut self, reached: impl Into<Option<ReachedRecord>>) -> Self {
         self.head.reached = reached.into();
@@ -132,7 +132,7 @@ impl Packed {
         self
     }
 
-    /// Replaces the limits on what a reader may make of the scene.
+    /// Replaces the limits on the decoded scene.
     #[must_use]
     pub fn with_limits(mut self, limits: Limits) -> Self {
         self.head.limits = limits;
@@ -140,7 +140,7 @@ impl Packed {
     }
 }
 
-/// The parts of a packed scene whose size grows with the number of Gaussians, in spill files.
+/// The ranges, the order and the extras of a packed scene, in spill files. Their size grows with the number of Gaussians.
 #[cfg(feature = "encode")]
 #[derive(Debug)]
 pub(crate) struct SpilledPacked {
@@ -152,7 +152,7 @@ pub(crate) struct SpilledPacked {
     pub(crate) extras: Vec<(Extra, Vec<(usize, Spilled)>)>,
 }
 
-/// The quality or the size that a search asked for, and what it reached.
+/// The target of a search, a quality or a size, and its result.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TargetRecord {

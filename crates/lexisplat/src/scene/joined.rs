@@ -96,7 +96,7 @@ impl SplatSource for Joined<'_> {
         self.tiles.iter().map(|tile| tile.source_bytes()).sum()
     }
 
-    fn parts(&self) -> &[&dyn SplatSource] {
+    fn tiles(&self) -> &[&dyn SplatSource] {
         &self.tiles
     }
 
@@ -181,7 +181,7 @@ mod tests {
         let named: Vec<(String, &dyn SplatSource)> =
             tiles.iter().map(|tile| (String::new(), tile as &dyn SplatSource)).collect();
         let joined = Joined::new(&named).unwrap();
-        assert_eq!((joined.len(), joined.parts().len()), (100, 3));
+        assert_eq!((joined.len(), joined.tiles().len()), (100, 3));
         let mut found = joined.empty();
         for range in [0..100, 29..32, 30..31, 5..5, 90..100] {
             joined.read(range.clone(), &mut found).unwrap();

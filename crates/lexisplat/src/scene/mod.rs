@@ -1,5 +1,6 @@
 //! Dense scenes: Gaussians, SH, sources to read scenes from, sensitivity of pictures, statistics.
 
+pub(crate) mod dropped;
 pub(crate) mod extra;
 pub(crate) mod joined;
 pub(crate) mod moved;

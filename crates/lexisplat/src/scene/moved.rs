@@ -1,4 +1,4 @@
-//! Scenes that are moved, or whose positions become relative to another offset.
+//! Moves of scenes, and changes of their offsets.
 
 use super::offset::{Offset, move_by, shift};
 use super::rounding::Rounding;
@@ -6,15 +6,15 @@ use super::splats::Splats;
 use crate::support::error::{Error, Result};
 
 impl Splats {
-    /// Makes positions relative to `offset` instead of their own. Every Gaussian stays where it is, but for rounding.
-    /// Returns what rounding did.
+    /// Makes positions relative to `offset` instead of the scene's own offset. Every Gaussian stays at its place, except for
+    /// rounding. Returns the rounding.
     pub fn rebase(&mut self, offset: Option<Offset>) -> Rounding {
         let error = shift(&mut self.geometry.positions, self.meta.offset, offset);
         self.meta.offset = offset;
         Rounding { error, size: self.median_size() }
     }
 
-    /// Moves every Gaussian by `by`. What single precision can hold is in the positions afterwards. If rounding would be
+    /// Moves every Gaussian by `by`. The positions change if single precision can hold the result. If rounding would be
     /// [coarse](Rounding::is_coarse), positions stay as they are and the offset changes.
     ///
     /// # Errors
@@ -36,7 +36,7 @@ impl Splats {
         Ok(())
     }
 
-    /// The median of the sizes of a sample of Gaussians; 0 if there are none.
+    /// Returns the median of the sizes of a sample of Gaussians; 0 if there are none.
     #[must_use]
     pub fn median_size(&self) -> f64 {
         let chosen = super::rounding::sample(self.len());
@@ -44,8 +44,8 @@ impl Splats {
     }
 }
 
-/// Makes the positions of both scenes relative to one offset ([`Offset::shared`]). Returns what rounding did to the one
-/// that it did more to.
+/// Makes the positions of both scenes relative to one offset ([`Offset::shared`]). Returns the larger of the two
+/// roundings.
 pub fn unite(a: &mut Splats, b: &mut Splats) -> Rounding {
     let shared = Offset::shared(&[(a.meta.offset, a.len() as u64), (b.meta.offset, b.len() as u64)]);
     let (a, b) = (a.rebase(shared), b.rebase(shared));

@@ -1,4 +1,4 @@
-//! Where a scene lies, if that is too far from the origin for positions in single precision.
+//! The offset of a scene that is too far from the origin for positions in single precision.
 
 use std::fmt;
 
@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::support::error::{Error, Result};
 
-/// What is added to every position, in double precision, to get to the world that the scene's file is in. At least one
-/// number is not 0, and all are finite.
+/// Three numbers that are added to every position, in double precision, to get to the world of the scene's file. At least
+/// one number is not 0, and all are finite.
 ///
 /// Coordinates of surveys are millions of units from the origin. Single precision has steps of half a unit there.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -18,7 +18,7 @@ pub struct Offset([f64; 3]);
 impl Eq for Offset {}
 
 impl Offset {
-    /// The offset of these three numbers; none if all are 0.
+    /// Returns the offset of these three numbers; `None` if all are 0.
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers that are not finite.
@@ -30,33 +30,34 @@ impl Offset {
         Ok(numbers.iter().any(|v| *v != 0.0).then_some(Self(numbers)))
     }
 
-    /// The three numbers.
+    /// Returns the three numbers.
     #[must_use]
     pub fn get(self) -> [f64; 3] {
         self.0
     }
 
-    /// The numbers of `offset`, which are 0 if there is none.
+    /// Returns the numbers of `offset`; zeros if there is none.
     #[must_use]
     pub fn numbers(offset: Option<Self>) -> [f64; 3] {
         offset.map_or([0.0; 3], Self::get)
     }
 
-    /// The one offset of a scene of several parts, each with its offset and its number of Gaussians: along each axis that
-    /// of the part in the middle. Parts without one do not count: they are not far away, or large.
+    /// Returns the one offset of a scene of several tiles, each with its offset and its number of Gaussians. Along each axis
+    /// it is the offset of the tile in the middle. Tiles without an offset do not count, because they are near the origin or
+    /// large.
     #[must_use]
-    pub fn shared(parts: &[(Option<Self>, u64)]) -> Option<Self> {
-        let parts: Vec<([f64; 3], u64)> = parts.iter().filter_map(|p| Some((p.0?.get(), p.1))).collect();
-        let total = parts.iter().map(|part| part.1).fold(0, u64::saturating_add);
+    pub fn shared(tiles: &[(Option<Self>, u64)]) -> Option<Self> {
+        let tiles: Vec<([f64; 3], u64)> = tiles.iter().filter_map(|p| Some((p.0?.get(), p.1))).collect();
+        let total = tiles.iter().map(|tile| tile.1).fold(0, u64::saturating_add);
         let middle = |axis: usize| {
-            let mut along: Vec<(f64, u64)> = parts.iter().map(|part| (part.0[axis], part.1)).collect();
+            let mut along: Vec<(f64, u64)> = tiles.iter().map(|tile| (tile.0[axis], tile.1)).collect();
             along.sort_by(|a, b| a.0.total_cmp(&b.0));
             let mut before = 0_u64;
             let found = along.iter().find(|(_, count)| {
                 before = before.saturating_add(*count);
                 before > total / 2
             });
-            found.or(along.last()).map_or(0.0, |part| part.0)
+            found.or(along.last()).map_or(0.0, |tile| tile.0)
         };
         Self::new([middle(0), middle(1), middle(2)]).ok().flatten()
     }
@@ -84,8 +85,8 @@ impl fmt::Display for Offset {
     }
 }
 
-/// Makes positions that are relative to `from` relative to `to`. Returns by how much rounding moves the one that it moves
-/// most, along an axis.
+/// Makes positions that are relative to `from` relative to `to`. Returns the largest move of a position by rounding,
+/// along an axis.
 pub(crate) fn shift(positions: &mut [[f32; 3]], from: Option<Offset>, to: Option<Offset>) -> f64 {
     if from == to {
         return 0.0;
@@ -94,7 +95,7 @@ pub(crate) fn shift(positions: &mut [[f32; 3]], from: Option<Offset>, to: Option
     move_by(positions, [0, 1, 2].map(|k| from[k] - to[k]))
 }
 
-/// Moves `positions`. Returns by how much rounding moves the one that it moves most, along an axis.
+/// Moves `positions`. Returns the largest move of a position by rounding, along an axis.
 pub(super) fn move_by(positions: &mut [[f32; 3]], by: [f64; 3]) -> f64 {
     let mut most = 0.0_f64;
     for position in positions {
@@ -107,7 +108,7 @@ pub(super) fn move_by(positions: &mut [[f32; 3]], by: [f64; 3]) -> f64 {
     most
 }
 
-/// `value` in single precision; infinite if it is too large.
+/// Returns `value` in single precision; infinite if it is too large.
 #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
 pub(crate) fn single(value: f64) -> f32 {
     value as f32
@@ -123,9 +124,9 @@ mod tests {
 
     #[test]
     fn the_part_in_the_middle_has_the_offset_of_all() {
-        let parts = [([8e5, 1.0, 0.0], 10), ([5e5, 0.0, 0.0], 15), ([9e5, 2.0, 0.0], 8)];
-        let parts = parts.map(|(numbers, count)| (offset(numbers), count));
-        assert_eq!(Offset::shared(&parts), offset([8e5, 1.0, 0.0]));
+        let tiles = [([8e5, 1.0, 0.0], 10), ([5e5, 0.0, 0.0], 15), ([9e5, 2.0, 0.0], 8)];
+        let tiles = tiles.map(|(numbers, count)| (offset(numbers), count));
+        assert_eq!(Offset::shared(&tiles), offset([8e5, 1.0, 0.0]));
         assert_eq!(Offset::shared(&[(None, 3), (None, 4)]), None);
         assert_eq!(Offset::shared(&[(None, 9), (offset([1e6; 3]), 4)]), offset([1e6; 3]));
         assert_eq!(Offset::shared(&[]), None);

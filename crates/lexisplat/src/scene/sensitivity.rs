@@ -28,6 +28,15 @@ pub struct Sensitivity {
     pub removal_view: Vec<f32>,
 }
 
+/// The sensitivity of pictures to the appearance of a Gaussian.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AppearanceSensitivity {
+    /// Sensitivity to one channel of the colour.
+    pub colour: f32,
+    /// Sensitivity to the logarithm of the opacity (after the sigmoid).
+    pub opacity: f32,
+}
+
 /// Sensitivity to the opacity, as a share of the sensitivity to the colour. This share and the shares below are averages of
 /// scenes measured with a renderer.
 const CONTRAST: f32 = 0.08;
@@ -36,17 +45,17 @@ const SCALE_SHARES: [f32; 3] = [0.6, 0.1, 0.05];
 /// Sensitivity to a turn, for each squared unit of lever, as a share of the sensitivity to the opacity.
 const ROTATION_SHARE: f32 = 0.1;
 
-/// Powers of the opacity and of the product of the two longest standard deviations. Measured weights are about proportional
-/// to both.
+/// Powers of the opacity and of the product of the two longest standard deviations. Measured sensitivities are about
+/// proportional to both.
 const ALPHA_POWER: f32 = 1.7;
 const AREA_POWER: f32 = 0.6;
-/// Smallest sum of guessed weights. The reciprocal of a much smaller sum is not a finite f32.
+/// Smallest sum of guessed sensitivities. The reciprocal of a much smaller sum is not a finite f32.
 const LEAST_TOTAL: f64 = 1e-30;
-/// Share of the 90th percentile of weights. A weight that is not above this share counts as not seen.
+/// Share of the 90th percentile of sensitivities. A sensitivity that is not above this share counts as not seen.
 const UNSEEN: f32 = 1e-4;
 
-/// Smallest weight of a Gaussian, as a share of its guessed weight. Steps are then at most 2.6 times as large as with the
-/// guess. From any viewpoint, a file is therefore not much worse than a file made with the guess.
+/// Smallest sensitivity to a Gaussian, as a share of the guessed sensitivity. Steps are then at most 2.6 times as large
+/// as with the guess. From any viewpoint, a file is therefore not much worse than a file made with the guess.
 const LEAST_OF_GUESS: f32 = 0.15;
 
 impl Sensitivity {
@@ -76,18 +85,18 @@ impl Sensitivity {
         self.colour.is_empty()
     }
 
-    /// Returns the sensitivities to the colour of Gaussian `i` and to the logarithm of its opacity.
+    /// Returns the sensitivity to the appearance of Gaussian `i`.
     ///
     /// # Panics
     /// If there is no Gaussian `i`.
     #[must_use]
-    pub fn appearance(&self, i: usize) -> [f32; 2] {
-        [self.colour[i], self.opacity[i]]
+    pub fn appearance(&self, i: usize) -> AppearanceSensitivity {
+        AppearanceSensitivity { colour: self.colour[i], opacity: self.opacity[i] }
     }
 
     /// Returns [`Self::appearance`] of all Gaussians.
     #[must_use]
-    pub fn appearances(&self) -> Vec<[f32; 2]> {
+    pub fn appearances(&self) -> Vec<AppearanceSensitivity> {
         (0..self.len()).map(|i| self.appearance(i)).collect()
     }
 
@@ -137,9 +146,9 @@ impl Sensitivity {
         whole.chain(shapes).for_each(|v| *v *= factor);
     }
 
-    /// Estimates the sensitivity from the Gaussians alone. Opaque and large Gaussians weigh most. The estimate does not
-    /// know which Gaussians hide others, so files made with it are larger than files of the same quality made with a
-    /// measured sensitivity.
+    /// Estimates the sensitivity from the Gaussians alone. It is largest for opaque and large Gaussians. The estimate
+    /// does not know which Gaussians hide others, so files made with it are larger than files of the same quality made
+    /// with a measured sensitivity.
     #[must_use]
     pub fn guess(geometry: &Geometry) -> Self {
         Self::guess_of_part(geometry, guessed_total(0.0, geometry))
@@ -154,7 +163,7 @@ impl Sensitivity {
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let unit = (1.0 / (3.0 * total.max(LEAST_TOTAL))) as f32;
         for i in 0..n {
-            out.set_guess(geometry, i, guessed_weight(geometry, i) * unit);
+            out.set_guess(geometry, i, unscaled_guess(geometry, i) * unit);
         }
         out
     }
@@ -180,9 +189,9 @@ impl Sensitivity {
         self.position[i] = [along, 0.0, 0.0, along, 0.0, along];
     }
 
-    /// Mixes the measured sensitivity with the guessed sensitivity, which does not depend on views. Each weight becomes the
-    /// geometric mean of the measured and the guessed weight, in which the guessed weight has the exponent `share`.
-    /// Gaussians that the views hardly showed keep a weight, because other views may show them. `geometry` has the same
+    /// Mixes the measured sensitivity with the guessed sensitivity, which does not depend on views. Each sensitivity becomes
+    /// the geometric mean of the measured and the guessed one, in which the guessed one has the exponent `share`. The result
+    /// is not 0 for Gaussians that the views hardly showed, because other views may show them. `geometry` has the same
     /// Gaussians.
     ///
     /// # Panics
@@ -200,12 +209,12 @@ impl Sensitivity {
         sorted.sort_by(f32::total_cmp);
         let floor = sorted[sorted.len() * 9 / 10] * UNSEEN;
         drop(sorted);
-        let guessed: f64 = (0..n).map(|i| f64::from(guessed_weight(geometry, i))).sum();
+        let guessed: f64 = (0..n).map(|i| f64::from(unscaled_guess(geometry, i))).sum();
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let unit = (total / guessed.max(LEAST_TOTAL)) as f32;
         let mixed: Vec<f32> = (0..n)
             .map(|i| {
-                let guessed = (guessed_weight(geometry, i) * unit).max(f32::MIN_POSITIVE);
+                let guessed = (unscaled_guess(geometry, i) * unit).max(f32::MIN_POSITIVE);
                 let seen = self.colour[i].max(floor).max(f32::MIN_POSITIVE);
                 let mixed = maths::exp((1.0 - share) * maths::ln(seen) + share * maths::ln(guessed));
                 mixed.max(LEAST_OF_GUESS * guessed)
@@ -229,19 +238,19 @@ impl Sensitivity {
     }
 }
 
-/// Returns `sum` plus the guessed weights of all Gaussians, before they are scaled. The weights are added one after the
+/// Returns `sum` plus the guessed sensitivities of all Gaussians, before they are scaled. They are added one after the
 /// other.
 pub(crate) fn guessed_total(sum: f64, geometry: &Geometry) -> f64 {
-    (0..geometry.len()).fold(sum, |sum, i| sum + f64::from(guessed_weight(geometry, i)))
+    (0..geometry.len()).fold(sum, |sum, i| sum + f64::from(unscaled_guess(geometry, i)))
 }
 
-/// Returns the guessed weight of Gaussian `i` before it is scaled.
-fn guessed_weight(geometry: &Geometry, i: usize) -> f32 {
+/// Returns the guessed sensitivity to the colour of Gaussian `i`, before it is scaled.
+fn unscaled_guess(geometry: &Geometry, i: usize) -> f32 {
     let scales = geometry.scales[i];
     let [longest, middle, _] = maths::longest_first(scales).map(|k| scales[k]);
     let alpha = maths::log_sigmoid(geometry.opacities[i]);
-    let weight = maths::exp(ALPHA_POWER * alpha + AREA_POWER * (longest + middle));
-    if weight.is_finite() { weight } else { 0.0 }
+    let guess = maths::exp(ALPHA_POWER * alpha + AREA_POWER * (longest + middle));
+    if guess.is_finite() { guess } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -249,13 +258,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_weight_is_far_below_the_guess() {
+    fn no_sensitivity_is_far_below_the_guess() {
         let geometry = crate::support::testing::scene(400, 5).geometry;
         let guessed = Sensitivity::guess(&geometry);
         let mut measured = guessed.clone();
         // The views saw only the first half of the scene, and hardly saw one of its Gaussians.
-        for (i, weight) in measured.colour.iter_mut().enumerate() {
-            *weight *= if i < 200 { 1.0 } else { 1e-9 };
+        for (i, colour) in measured.colour.iter_mut().enumerate() {
+            *colour *= if i < 200 { 1.0 } else { 1e-9 };
         }
         measured.colour[7] *= 1e-3;
         measured.blend_with_prior(&geometry, 0.3);
@@ -263,7 +272,7 @@ mod tests {
         let unit = total(&measured) / total(&guessed);
         let shares = (0..400).map(|i| f64::from(measured.colour[i]) / (f64::from(guessed.colour[i]) * unit));
         let least = shares.fold(f64::INFINITY, f64::min);
-        // The sum of all weights is kept, which changes each weight a little.
+        // The sum of all sensitivities is kept, which changes each of them a little.
         let expected = f64::from(LEAST_OF_GUESS);
         assert!((0.8 * expected..1.25 * expected).contains(&least), "{least}");
     }

@@ -37,9 +37,8 @@ pub trait SplatSource {
         (self.len() as u64).saturating_mul(self.row_bytes())
     }
 
-    /// Returns the sources that this source consists of, one after the other, such as the tiles of a scene. The list is
-    /// empty if the source does not consist of others.
-    fn parts(&self) -> &[&dyn SplatSource] {
+    /// Returns the tiles of the scene, one after the other. The list is empty if the scene is one tile.
+    fn tiles(&self) -> &[&dyn SplatSource] {
         &[]
     }
 

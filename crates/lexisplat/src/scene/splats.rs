@@ -8,18 +8,18 @@ use crate::scene::offset::Offset;
 use crate::scene::sh::ShDegree;
 use crate::support::error::{Error, Result};
 
-/// Stands for an infinite opacity, which keeps its sign. Opacities are stored before the sigmoid; in f32 the sigmoid of
-/// this value is 1 and that of its negative is 0, to the last bit. Decoders of 8-bit opacities (SPZ, compressed.ply) write
-/// infinities for 255 and 0.
+/// Value that replaces an infinite opacity, which keeps its sign. Opacities are stored before the sigmoid. In f32 the
+/// sigmoid of this value is 1, and that of its negative is 0, to the last bit. Decoders of 8-bit opacities (SPZ,
+/// compressed.ply) write infinities for 255 and 0.
 pub const SURE_OPACITY: f32 = 100.0;
 
-/// Stands for a scale of minus infinity, the logarithm of a size of zero, which converters of 2D Gaussians write. e^-20 is
-/// 2e-9 units: no picture shows a size so small, since the rasteriser blurs by 0.3 squared pixels. It is the smallest
-/// logarithm that the compressed PLY of `PlayCanvas` holds (`compressed-chunk.ts`). It does not depend on the scene, so parts of a
-/// scene read the same as the whole.
+/// Value that replaces a scale of minus infinity, the logarithm of a size of zero, which converters of 2D Gaussians
+/// write. e^-20 is 2e-9 units. No picture shows so small a size, since the rasteriser blurs by 0.3 squared pixels. It is
+/// the smallest logarithm that the compressed PLY of `PlayCanvas` holds (`compressed-chunk.ts`). It does not depend on
+/// the scene, so parts of a scene have the same values as the whole.
 pub const FLAT_SCALE: f32 = -20.0;
 
-/// Puts [`FLAT_SCALE`] for scales of minus infinity. Returns how many Gaussians have any.
+/// Replaces scales of minus infinity by [`FLAT_SCALE`]. Returns the number of Gaussians that have any.
 pub fn flatten_scales(scales: &mut [[f32; 3]]) -> usize {
     let mut flat = 0;
     for row in scales.iter_mut().filter(|row| row.contains(&f32::NEG_INFINITY)) {
@@ -29,20 +29,20 @@ pub fn flatten_scales(scales: &mut [[f32; 3]]) -> usize {
     flat
 }
 
-/// What a reader says of `flat` Gaussians of [`flatten_scales`].
+/// Returns the warning of a reader about `flat` Gaussians of [`flatten_scales`].
 pub(crate) fn flat_note(flat: usize) -> String {
     let gaussians = if flat == 1 { "Gaussian has" } else { "Gaussians have" };
     format!("{flat} {gaussians} a size of zero (a scale of -inf), taken as e^{FLAT_SCALE}: flat")
 }
 
-/// Everything of a scene but its SH-rest coefficients, one entry a Gaussian in every array.
+/// Everything of a scene but its SH-rest coefficients. Every array has one entry for each Gaussian.
 ///
 /// Values are as the trainer stored them, before any activation.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Geometry {
     /// Centres in world units, relative to [`SceneMeta::offset`].
     pub positions: Vec<[f32; 3]>,
-    /// Normals. Empty if the file has none or all are zero; every known trainer writes zeros.
+    /// Normals. Empty if the file has none or all are zero. Every known trainer writes zeros.
     pub normals: Vec<[f32; 3]>,
     /// SH coefficient 0 of red, green and blue. The base colour is `0.5 + C0 * dc`.
     pub dc: Vec<[f32; 3]>,
@@ -52,19 +52,19 @@ pub struct Geometry {
     pub scales: Vec<[f32; 3]>,
     /// Quaternions (w, x, y, z), not necessarily of unit length.
     pub rotations: Vec<[f32; 4]>,
-    /// Per-Gaussian properties that no layout defines, in file order.
+    /// Per-Gaussian properties that 3DGS does not define, in file order.
     pub extras: Vec<Extra>,
 }
 
-/// What the file of a scene says about it beside its Gaussians. It is kept from PLY to .lexi and back.
+/// Facts about a scene in its file, beside its Gaussians. They are kept from PLY to .lexi and back.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneMeta {
     /// `comment` lines of the source, without the keyword, in order.
     pub comments: Vec<String>,
-    /// Trained with the anti-aliased (Mip-Splatting) dilation: Brush `SplatRenderMode: mip`,
+    /// Whether the scene was trained with the anti-aliased (Mip-Splatting) dilation: Brush `SplatRenderMode: mip`,
     /// Postshot `antialiased 1`.
     pub antialiased: bool,
-    /// What is added to positions to get to where the source has them. None if positions are those of the source.
+    /// The numbers that are added to positions to get the positions of the source; `None` if these are the same.
     pub offset: Option<Offset>,
 }
 
@@ -79,14 +79,14 @@ impl SceneMeta {
     }
 }
 
-/// A scene with dense SH: what a trainer's PLY holds.
+/// A scene with dense SH, as in a trainer's PLY.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Splats {
     /// Everything but SH-rest.
     pub geometry: Geometry,
     /// SH degree.
     pub degree: ShDegree,
-    /// SH-rest, `degree.rest()` values a Gaussian, channel-major within each.
+    /// SH-rest: `degree.rest()` values for each Gaussian, channel-major.
     pub sh_rest: Vec<f32>,
     /// Comments and marks.
     pub meta: SceneMeta,
@@ -116,7 +116,7 @@ impl Geometry {
         }
     }
 
-    /// `n` Gaussians of zeros, without normals and extras.
+    /// Returns `n` Gaussians of zeros, without normals and extras.
     pub(crate) fn zeros(n: usize) -> Self {
         Self {
             positions: vec![[0.0; 3]; n],
@@ -128,13 +128,13 @@ impl Geometry {
         }
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
@@ -143,7 +143,7 @@ impl Geometry {
     /// Checks that all arrays have the same length.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the array that differs.
+    /// [`Error::Parameter`] that names the array with another length.
     pub fn validate(&self) -> Result<()> {
         let n = self.len();
         let lengths = [
@@ -176,13 +176,13 @@ impl Geometry {
     /// Checks that every value is finite, except those of extras.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the array and the first value that is not.
+    /// [`Error::Parameter`] that names the array and the first value that is not finite.
     pub(crate) fn validate_values(&self) -> Result<()> {
         let names = ["positions", "dc", "opacities", "scales", "rotations", "normals"];
         all_finite(names.into_iter().zip(self.floats()))
     }
 
-    /// The values of positions, base colours, opacities, scales, rotations and normals.
+    /// Returns the values of positions, base colours, opacities, scales, rotations and normals.
     pub(crate) fn floats(&self) -> [&[f32]; 6] {
         [
             self.positions.as_flattened(),
@@ -194,7 +194,7 @@ impl Geometry {
         ]
     }
 
-    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
+    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry for each Gaussian.
     pub fn retain(&mut self, keep: &[bool]) {
         filter(&mut self.positions, keep);
         filter(&mut self.normals, keep);
@@ -215,19 +215,19 @@ pub(crate) fn filter<T: Copy>(values: &mut Vec<T>, keep: &[bool]) {
 }
 
 impl Splats {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
         self.geometry.len()
     }
 
-    /// Whether there are no Gaussians.
+    /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.geometry.is_empty()
     }
 
-    /// SH-rest of Gaussian `i`: `degree.rest()` values, channel-major.
+    /// Returns the SH-rest of Gaussian `i`: `degree.rest()` values, channel-major.
     ///
     /// # Panics
     /// If `i` is not below [`Self::len`].
@@ -240,7 +240,7 @@ impl Splats {
     /// Checks that all arrays have the same length.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the array that differs.
+    /// [`Error::Parameter`] that names the array with another length.
     pub fn validate(&self) -> Result<()> {
         self.geometry.validate()?;
         let expected = self.len() * self.degree.rest();
@@ -257,7 +257,7 @@ impl Splats {
         self.sh_rest.extend(other.sh_rest);
     }
 
-    /// Gives back the memory that a longer scene took, but for that of extras.
+    /// Frees memory that a longer scene took, except that of extras.
     pub(crate) fn shrink_to_fit(&mut self) {
         let g = &mut self.geometry;
         g.positions.shrink_to_fit();
@@ -269,7 +269,7 @@ impl Splats {
         self.sh_rest.shrink_to_fit();
     }
 
-    /// A copy of the Gaussians at the indices `order`, in this order.
+    /// Returns a copy of the Gaussians at the indices `order`, in this order.
     ///
     /// # Panics
     /// If an index is out of range.
@@ -297,7 +297,7 @@ impl Splats {
         Self { geometry, degree: self.degree, sh_rest, meta: self.meta.clone() }
     }
 
-    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
+    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry for each Gaussian.
     pub fn retain(&mut self, keep: &[bool]) {
         self.geometry.retain(keep);
         let dim = self.degree.rest();
@@ -309,7 +309,7 @@ impl Splats {
         self.sh_rest.truncate(kept * dim);
     }
 
-    /// The same scene with SH of at most `degree`: higher coefficients are cut off.
+    /// Returns the scene with SH of at most `degree`. Higher coefficients are cut off.
     #[must_use]
     pub fn with_degree_cut(&self, degree: ShDegree) -> Self {
         let degree = degree.min(self.degree);

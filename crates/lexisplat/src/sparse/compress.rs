@@ -95,25 +95,25 @@ pub fn compress(
 }
 
 /// A function that codes the Gaussians of a range and appends their codes.
-type CodePart<'a> = dyn FnMut(&Encoder, Range<usize>, &mut Coded) -> Result<()> + 'a;
+type CodeNext<'a> = dyn FnMut(&Encoder, Range<usize>, &mut Coded) -> Result<()> + 'a;
 
 /// The results of [`encode`].
 pub(crate) struct Encoded {
     pub(crate) dictionary: Dictionary,
-    /// The codes that `code_part` appended and did not clear.
+    /// The codes that `code_next` appended and did not clear.
     pub(crate) coded: Coded,
     pub(crate) record: Record,
     pub(crate) report: CompressReport,
 }
 
-/// Checks `options`, learns the dictionary from rows of `source`, and calls `code_part` for successive ranges of Gaussians.
+/// Checks `options`, learns the dictionary from rows of `source`, and calls `code_next` for successive ranges of Gaussians.
 /// Each range but the last has `at_once` Gaussians, which must be a multiple of [`GAUSSIANS_PER_TASK`].
 pub(crate) fn encode(
     source: &dyn SplatSource,
     options: &CompressOptions,
     at_once: usize,
     progress: &dyn Progress,
-    code_part: &mut CodePart<'_>,
+    code_next: &mut CodeNext<'_>,
 ) -> Result<Encoded> {
     debug_assert!(at_once.is_multiple_of(GAUSSIANS_PER_TASK), "sums would be added in another order");
     let n = source.len();
@@ -126,7 +126,7 @@ pub(crate) fn encode(
     progress.begin(Stage::Code, n as u64);
     for start in (0..n).step_by(at_once) {
         progress.check()?;
-        code_part(&encoder, start..n.min(start + at_once), &mut coded)?;
+        code_next(&encoder, start..n.min(start + at_once), &mut coded)?;
     }
     progress.end();
     let record = Record {
@@ -137,7 +137,8 @@ pub(crate) fn encode(
         ..Record::default()
     };
     let tally = std::mem::take(&mut coded.tally);
-    let (record, report) = tally.into_report(record, n, learned, [learn_seconds, clock.seconds()]);
+    let (record, report) = tally.into_report(record, n);
+    let report = CompressReport { learned, learn_seconds, code_seconds: clock.seconds(), ..report };
     Ok(Encoded { dictionary: encoder.dictionary, coded, record, report })
 }
 
@@ -216,18 +217,18 @@ impl Encoder {
             progress.advance(range.len() as u64);
             return Ok(());
         };
-        let parts = map_chunks(range.len(), GAUSSIANS_PER_TASK, |piece| {
+        let tasks = map_chunks(range.len(), GAUSSIANS_PER_TASK, |piece| {
             progress.check()?;
-            let mut part = Part { tally: Tally::new(dim), ..Part::default() };
+            let mut codes = TaskCodes { tally: Tally::new(dim), ..TaskCodes::default() };
             let start = range.start + piece.start;
             let rest = &rest[piece.start * dim..piece.end * dim];
             all_finite([("sh_rest", rest)])?;
-            coder.encode(rest, |visit| part.push(start, &visit, self.tolerance));
+            coder.encode(rest, |visit| codes.push(start, &visit, self.tolerance));
             progress.advance(piece.len() as u64);
-            Ok(part)
+            Ok(codes)
         });
-        for part in parts {
-            coded.append(part?);
+        for codes in tasks {
+            coded.append(codes?);
         }
         Ok(())
     }
@@ -235,14 +236,14 @@ impl Encoder {
 
 /// Codes of a run of Gaussians, with room for atoms and values of any type.
 #[derive(Debug, Default)]
-struct Part {
+struct TaskCodes {
     counts: Vec<u8>,
     pairs: Vec<(u16, f32)>,
     escapes: Escapes,
     tally: Tally,
 }
 
-impl Part {
+impl TaskCodes {
     /// Appends the next code. Escapes are numbered from `start`.
     fn push(&mut self, start: usize, visit: &Visit<'_>, tolerance: Option<f64>) {
         let code = match visit.outcome {
@@ -275,9 +276,9 @@ pub(crate) struct Coded {
 }
 
 impl Coded {
-    /// Appends `part`.
-    fn append(&mut self, part: Part) {
-        let Part { counts, pairs, escapes, tally } = part;
+    /// Appends `codes`.
+    fn append(&mut self, codes: TaskCodes) {
+        let TaskCodes { counts, pairs, escapes, tally } = codes;
         self.counts.extend(counts);
         match &mut self.indices {
             #[expect(clippy::cast_possible_truncation, reason = "chosen for at most 256 atoms")]

@@ -8,7 +8,7 @@ use crate::sparse::dictionary::Dictionary;
 use crate::support::error::{Error, Result};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, for_each_chunk_mut};
 
-/// A scene whose SH-rest is a dictionary and sparse codes. Its parts always fit one another.
+/// A scene whose SH-rest is a dictionary and sparse codes. All of its arrays fit one another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
     geometry: Geometry,
@@ -106,7 +106,7 @@ pub(crate) use named;
 named!(Pursuit, "pursuit", Omp => "omp", Ols => "ols");
 
 impl Model {
-    /// Creates a model from its parts.
+    /// Creates a model from its fields.
     ///
     /// # Errors
     /// [`Error::Parameter`] if the arrays of `geometry` differ in length, if there is not one column of codes for
@@ -167,7 +167,7 @@ impl Model {
         &self.record
     }
 
-    /// Returns the parts that [`Self::new`] takes, in its order.
+    /// Returns the fields that [`Self::new`] takes, in its order.
     #[must_use]
     pub fn into_parts(self) -> (Geometry, SceneMeta, Dictionary, SparseCodes, Record) {
         (self.geometry, self.meta, self.dictionary, self.codes, self.record)

@@ -2,13 +2,13 @@
 
 /// A number of rows and of their codes: `f32` or `f64`.
 pub trait RowValue: Copy + Default + PartialEq + Send + Sync + sealed::Sealed {
-    /// The same number in double precision.
+    /// Returns the number in double precision.
     fn wide(self) -> f64;
 
-    /// The number of this type that is nearest to `value`.
+    /// Returns the number of this type that is nearest to `value`.
     fn nearest(value: f64) -> Self;
 
-    /// `rows` in single precision. Numbers out of its range are infinite, or 0.
+    /// Returns `rows` in single precision. Numbers out of its range become infinite, or 0.
     fn narrow(rows: &[Self]) -> std::borrow::Cow<'_, [f32]>;
 }
 

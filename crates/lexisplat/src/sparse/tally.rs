@@ -62,25 +62,18 @@ impl Tally {
         self.over_tolerance += u64::from(tolerance.is_some_and(|t| error > t));
     }
 
-    /// Adds the counts of the next part of the scene.
-    pub(crate) fn add(&mut self, part: &Self) {
-        self.histogram.iter_mut().zip(&part.histogram).for_each(|(a, b)| *a += b);
-        self.escapes += part.escapes;
-        self.nonzeros += part.nonzeros;
-        self.max_error = self.max_error.max(part.max_error);
-        self.squared_error += part.squared_error;
-        self.over_tolerance += part.over_tolerance;
+    /// Adds the counts of further Gaussians.
+    pub(crate) fn add(&mut self, more: &Self) {
+        self.histogram.iter_mut().zip(&more.histogram).for_each(|(a, b)| *a += b);
+        self.escapes += more.escapes;
+        self.nonzeros += more.nonzeros;
+        self.max_error = self.max_error.max(more.max_error);
+        self.squared_error += more.squared_error;
+        self.over_tolerance += more.over_tolerance;
     }
 
-    /// Returns `record` with the errors, and the report. `gaussians` is the number of Gaussians, and `seconds` are those of
-    /// learning and of coding.
-    pub(crate) fn into_report(
-        self,
-        record: Record,
-        gaussians: usize,
-        learned: Option<Learned>,
-        seconds: [f64; 2],
-    ) -> (Record, CompressReport) {
+    /// Returns `record` with the errors, and the report of `gaussians` Gaussians without times.
+    pub(crate) fn into_report(self, record: Record, gaussians: usize) -> (Record, CompressReport) {
         let count = gaussians.max(1) as f64;
         let dim = self.histogram.len() as u64 - 1;
         let record = Record {
@@ -90,12 +83,12 @@ impl Tally {
             ..record
         };
         let report = CompressReport {
-            learned,
+            learned: None,
             mean_nonzeros: (self.nonzeros + self.escapes * dim) as f64 / count,
             nonzero_histogram: self.histogram,
             escapes: self.escapes,
-            learn_seconds: seconds[0],
-            code_seconds: seconds[1],
+            learn_seconds: 0.0,
+            code_seconds: 0.0,
             stream_bits: Vec::new(),
         };
         (record, report)

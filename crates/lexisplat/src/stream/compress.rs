@@ -1,6 +1,6 @@
 //! Compression to the exact layouts, a part of the scene at a time.
 
-use crate::formats::lexi::{CodeLayout, LexiWriter, SpilledModel, sh_bytes};
+use crate::formats::lexi::{CodeLayout, LexiWriter, SpilledModel};
 use crate::scene::source::SplatSource;
 use crate::sparse::compress::{CompressOptions, Encoded, encode};
 use crate::sparse::dictionary::Dictionary;
@@ -25,8 +25,8 @@ pub struct Compressed {
     pub record: Record,
     /// A report of learning and coding.
     pub report: CompressReport,
-    /// Number of bytes of each tensor, and of the header under the name `header`; see [`LexiWriter::attribute_bytes`].
-    pub attribute_bytes: Vec<(String, u64)>,
+    /// Number of bytes of each tensor, and of the header under the name `header`; see [`LexiWriter::tensor_bytes`].
+    pub tensor_bytes: Vec<(String, u64)>,
     /// Seconds spent on writing the file, after everything was coded.
     pub write_seconds: f64,
 }
@@ -35,13 +35,7 @@ impl Compressed {
     /// Returns the number of bytes of the file.
     #[must_use]
     pub fn file_bytes(&self) -> u64 {
-        self.attribute_bytes.iter().map(|a| a.1).sum()
-    }
-
-    /// Returns the number of bytes that stand for SH-rest; see [`LexiWriter::sh_bytes`].
-    #[must_use]
-    pub fn sh_bytes(&self) -> u64 {
-        sh_bytes(&self.attribute_bytes)
+        self.tensor_bytes.iter().map(|a| a.1).sum()
     }
 }
 
@@ -82,10 +76,10 @@ fn run(
         })?;
     let clock = Stopwatch::start();
     let writer = LexiWriter::spilled(spilled, &dictionary, &record, &splats.meta)?;
-    let attribute_bytes = writer.attribute_bytes().to_vec();
+    let tensor_bytes = writer.tensor_bytes().to_vec();
     writer.write(sink, progress)?;
     let (gaussians, write_seconds) = (source.len(), clock.seconds());
-    Ok(Compressed { gaussians, dictionary, record, report, attribute_bytes, write_seconds })
+    Ok(Compressed { gaussians, dictionary, record, report, tensor_bytes, write_seconds })
 }
 
 #[cfg(test)]

@@ -40,14 +40,16 @@ mod source_order;
 mod survey;
 
 #[cfg(feature = "encode")]
+pub use crate::packed::tiles::PackedFile;
+#[cfg(feature = "encode")]
 pub use compress::{Compressed, compress};
 pub use decompress::decompress;
 #[cfg(feature = "encode")]
 pub use observer::{Observed, Observer};
+#[cfg(feature = "encode")]
+pub use pack::pack;
 #[cfg(all(test, feature = "encode"))]
 pub(crate) use pack::run as pack_in_buckets;
-#[cfg(feature = "encode")]
-pub use pack::{PackedFile, pack};
 #[cfg(feature = "encode")]
 pub(crate) use rows::RowLayout;
 pub use source_order::in_source_order;

@@ -1,7 +1,7 @@
 //! The interface of a renderer to packing: it draws a scene part by part, if the scene is too large to be drawn as a whole.
 
 use crate::packed::Appearance;
-use crate::scene::sensitivity::Sensitivity;
+use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity};
 use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
@@ -15,10 +15,10 @@ pub trait Observer<E = Error> {
     /// Those of drawing.
     fn observe(&mut self, part: &Splats) -> Result<Observed, E>;
 
-    /// Returns the base colours and opacities with which pictures of `model` are nearest to those of `part`; `None` leaves
-    /// them as they are. `model` is the part as the file has it. `weights` are the sensitivities of the Gaussians of
-    /// `model` to the colour and to the logarithm of the opacity. `memo` is the one of [`Observed`]. The function is called
-    /// for each part, if the options let these values change.
+    /// Returns the base colours and opacities with which pictures of `model` are nearest to those of `part`; `None`
+    /// leaves them as they are. `model` is the part as the file has it. `sensitivities` has the sensitivity to the
+    /// appearance of each Gaussian of `model`. `memo` is the one of [`Observed`]. The function is called for each part,
+    /// if the options let these values change.
     ///
     /// # Errors
     /// Those of drawing.
@@ -26,7 +26,7 @@ pub trait Observer<E = Error> {
         &mut self,
         _part: &Splats,
         _model: &Model,
-        _weights: &[[f32; 2]],
+        _sensitivities: &[AppearanceSensitivity],
         _memo: &[u8],
     ) -> Result<Option<Vec<Appearance>>, E> {
         Ok(None)

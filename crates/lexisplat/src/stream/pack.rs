@@ -3,39 +3,20 @@
 use super::observer::{Observed, Observer};
 use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
-use crate::packed::tiles::{Assembly, BUCKET, Coded, Coding, Looked, Plan, SHOWN, Sample, Steps, Tables};
-use crate::packed::{PackOptions, PackedHead, Packer, Refit};
-use crate::scene::sensitivity::{Sensitivity, guessed_total};
+use crate::packed::tiles::{
+    Assembly, BUCKET, Coded, Coding, Looked, PackedFile, Plan, SHOWN, Sample, Steps, Tables,
+};
+use crate::packed::{PackOptions, Packer, Refit};
+use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity, guessed_total};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
-use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::progress::{Progress, Stage};
 use crate::support::sink::Sink;
 use crate::support::spill::{SpillTo, Temporary};
 use crate::support::stopwatch::Stopwatch;
-
-/// The results of [`pack`].
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct PackedFile {
-    /// The parts of the packed scene whose size does not depend on the number of Gaussians.
-    pub head: PackedHead,
-    /// A report of the packing.
-    pub report: CompressReport,
-    /// Number of bytes of each tensor and of the header; see [`LexiWriter::attribute_bytes`].
-    pub tensor_bytes: Vec<(String, u64)>,
-}
-
-impl PackedFile {
-    /// Returns the number of bytes of the file.
-    #[must_use]
-    pub fn file_bytes(&self) -> u64 {
-        self.tensor_bytes.iter().map(|t| t.1).sum()
-    }
-}
 
 /// Packs the scene of `source` so that its pictures have a PSNR of about `decibels` dB, and writes it to `sink`.
 ///
@@ -44,7 +25,7 @@ impl PackedFile {
 /// over all buckets. Without an observer, the sensitivity is guessed from each Gaussian alone.
 ///
 /// The bytes are the same on any number of threads. They are also those that other processes make of the same tiles, which
-/// are the [parts](SplatSource::parts) of `source`. Peak of anonymous memory is below 1.5 GiB at SH degree 3.
+/// are the [parts](SplatSource::tiles) of `source`. Peak of anonymous memory is below 1.5 GiB at SH degree 3.
 ///
 /// # Errors
 /// [`Error::Parameter`] if options are out of range, if values are so large that sums of them leave f32, or if a
@@ -104,13 +85,13 @@ fn whole<E: From<Error>>(
     let quantised = packer.quantise(factor * packer.step_for(decibels), true, progress)?;
     let device = observer.as_ref().and_then(|observer| observer.device());
     let mut refit = observer.map(|observer| {
-        |part: &Splats, model: &Model, weights: &[[f32; 2]]| observer.refit(part, model, weights, &memo)
+        |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| observer.refit(part, model, own, &memo)
     });
     let appearances = quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
     let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
     let packed = packed.with_device(device);
     let writer = LexiWriter::packed(&packed);
-    let tensor_bytes = writer.attribute_bytes().to_vec();
+    let tensor_bytes = writer.tensor_bytes().to_vec();
     writer.write(sink, progress)?;
     Ok(PackedFile { head: packed.head().clone(), report, tensor_bytes })
 }
@@ -127,9 +108,9 @@ fn in_buckets<E: From<Error>>(
     let clock = Stopwatch::start();
     let folder = sink.spill_folder()?;
     let to = SpillTo::Folder(&folder);
-    let tiles = match source.parts() {
+    let tiles = match source.tiles() {
         [] => vec![source],
-        parts => parts.to_vec(),
+        tiles => tiles.to_vec(),
     };
     begin_reading(&tiles, progress);
     let surveys = survey(&tiles, options.seed, progress)?;
@@ -169,8 +150,8 @@ fn in_buckets<E: From<Error>>(
         let bucket = ordered.bucket(&plan, number, true)?;
         let looked = Looked::from_bytes(&all_looked.read(number)?)?;
         let mut refit = observer.as_mut().map(|observer| {
-            |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
-                observer.refit(part, model, weights, looked.memo())
+            |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| {
+                observer.refit(part, model, own, looked.memo())
             }
         });
         let refit = refit.as_mut().map(|refit| refit as &mut Refit<'_, E>);

@@ -1,4 +1,4 @@
-//! What can go wrong, split by who is to blame.
+//! Errors, in variants by the cause: the system, the file, the caller, or a limit.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use crate::formats::kind::{FileKind, Unsupported};
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Any failure of the codec. The variant tells who is to blame.
+/// Any failure of the codec. The variant tells the cause: the system, the file, the caller, or a limit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -33,34 +33,34 @@ pub enum Error {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The bytes are not what they claim to be. The file is at fault.
+    /// A file is damaged, or of an unsupported kind.
     #[error("{file}: {problem}")]
     Format {
         /// The file, as the caller named it.
         file: String,
-        /// What is wrong with it.
+        /// The fault.
         problem: FormatError,
     },
-    /// An argument is out of range. The caller is at fault.
+    /// An argument of the caller is out of range.
     #[error("{name} = {value}: {expected}")]
     Parameter {
         /// The parameter's name.
         name: &'static str,
         /// The value given.
         value: String,
-        /// What would have been accepted.
+        /// A description of the accepted values.
         expected: String,
     },
-    /// The input may be well formed but asks for more than [`crate::Limits`] allows.
+    /// The input may be well formed but is over [`crate::Limits`].
     #[error("{what}: {found} is over the limit of {limit}")]
     Limit {
-        /// What was counted, and the file.
+        /// The counted things, and the file.
         what: String,
-        /// How many were asked for.
+        /// The number in the file.
         found: u64,
-        /// How many are allowed.
+        /// The allowed number.
         limit: u64,
-        /// Which of [`crate::Limits::NAMES`] to raise; `None` if the limit is fixed.
+        /// The limit to raise, one of [`crate::Limits::NAMES`]; `None` if it is fixed.
         name: Option<&'static str>,
     },
     /// The caller's [`Progress`](crate::Progress) cancelled the work.
@@ -68,7 +68,7 @@ pub enum Error {
     Cancelled,
 }
 
-/// What is wrong with a file's bytes.
+/// The fault of a file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FormatError {
@@ -77,9 +77,9 @@ pub enum FormatError {
     Truncated {
         /// The part that does not fit.
         what: String,
-        /// Bytes the header promises.
+        /// Number of bytes that the header promises.
         expected: u64,
-        /// Bytes there are.
+        /// Number of bytes in the file.
         found: u64,
     },
     /// A property that every Gaussian needs does not exist.
@@ -87,21 +87,21 @@ pub enum FormatError {
     MissingProperty {
         /// The property's name.
         name: String,
-        /// What the file has instead, starting with punctuation; may be empty.
+        /// The end of the message, starting with punctuation: the properties that the file has instead. It may be empty.
         hint: &'static str,
     },
-    /// A file of a kind that this reader does not read, but another one of this crate does.
+    /// A file of a kind that another reader of this crate reads.
     #[error("this is {found}, not {expected}")]
     OtherKind {
         /// The kind of the file.
         found: FileKind,
-        /// The kind that was to be read.
+        /// The kind that the reader expected.
         expected: FileKind,
     },
     /// A known kind of file that this crate does not read.
     #[error("this is {kind}, which is not supported; {}", kind.advice())]
     Unsupported {
-        /// What it is.
+        /// The kind of the file.
         kind: Unsupported,
     },
     /// NaN or infinite values. A reader leaves such Gaussians out if
@@ -110,7 +110,7 @@ pub enum FormatError {
         "{count} Gaussians hold NaN or infinite values, the first is number {first} (property '{property}')"
     )]
     NotFinite {
-        /// How many Gaussians hold at least one.
+        /// Number of Gaussians that hold at least one such value.
         count: u64,
         /// Index of the first such Gaussian, from 0.
         first: u64,
@@ -130,41 +130,41 @@ pub enum FormatError {
     Version {
         /// Version in the file.
         found: u64,
-        /// Newest version this build reads.
+        /// Newest version that this crate reads.
         supported: u64,
     },
-    /// Anything else; the text names the property and the value.
+    /// Another fault. The text names the property and the value.
     #[error("{0}")]
     Malformed(String),
 }
 
 impl Error {
-    /// An [`Error::Io`] about `file`.
+    /// Returns an [`Error::Io`] about `file`.
     pub fn io(file: impl AsRef<Path>, source: std::io::Error) -> Self {
         Self::Io { file: file.as_ref().display().to_string(), source }
     }
 
-    /// An [`Error::TemporaryFile`] in `folder`.
+    /// Returns an [`Error::TemporaryFile`] in `folder`.
     pub(crate) fn temporary_file(folder: &Path, source: std::io::Error) -> Self {
         Self::TemporaryFile { folder: folder.to_owned(), source }
     }
 
-    /// An [`Error::Format`] about `file`.
+    /// Returns an [`Error::Format`] about `file`.
     pub fn format(file: impl Into<String>, problem: FormatError) -> Self {
         Self::Format { file: file.into(), problem }
     }
 
-    /// An [`Error::Format`] about `file` with a free text.
+    /// Returns an [`Error::Format`] about `file` with a free text.
     pub fn malformed(file: impl Into<String>, text: impl Into<String>) -> Self {
         Self::format(file, FormatError::Malformed(text.into()))
     }
 
-    /// An [`Error::Limit`].
+    /// Returns an [`Error::Limit`].
     pub(crate) fn limit(what: impl Into<String>, found: u64, limit: u64, name: Option<&'static str>) -> Self {
         Self::Limit { what: what.into(), found, limit, name }
     }
 
-    /// An [`Error::Parameter`].
+    /// Returns an [`Error::Parameter`].
     pub fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
         Self::Parameter { name, value: value.to_string(), expected: expected.into() }
     }

@@ -1,11 +1,11 @@
-//! A file's bytes, mapped if possible.
+//! The bytes of a file, mapped if possible.
 //!
 //! # Why this module may use `unsafe`
-//! Mapping a file is the only way to read a gigabyte without copying it first. `memmap2` can only offer it as an
-//! unsafe function: if another process shortens the file while it is mapped, touching the lost pages raises
-//! `SIGBUS`. (Windows forbids the shortening instead.) A process cannot rule that out for a file it does not own.
-//! Changed contents are harmless here, because every reader treats the bytes as untrusted and takes sizes from the
-//! header only once. Callers who cannot accept the risk build without the `mmap` feature, or pass bytes they own.
+//! Mapping a file is the only way to read a gigabyte without copying it first. `memmap2` can offer it only as an unsafe
+//! function. If another process shortens the file while it is mapped, reading the lost pages raises `SIGBUS`. (Windows
+//! forbids the shortening.) A process cannot exclude this for a file that it does not own. Changed contents are harmless
+//! here, because every reader treats the bytes as untrusted and takes sizes from the header only once. Callers who cannot
+//! accept the risk build without the `mmap` feature, or pass bytes they own.
 
 use std::io::{self, Read};
 use std::ops::Deref;
@@ -14,7 +14,7 @@ use std::path::Path;
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 
-/// The bytes of a file, as a slice. They are the file's own pages if it can be mapped, else a copy.
+/// The bytes of a file, as a slice. They are the pages of the file if it can be mapped, otherwise a copy.
 #[derive(Debug)]
 pub struct Input(Bytes);
 
@@ -28,7 +28,7 @@ enum Bytes {
 }
 
 impl Input {
-    /// Maps `path` if it is a regular file, else reads it to its end.
+    /// Maps `path` if it is a regular file; otherwise reads it to its end.
     ///
     /// # Errors
     /// [`Error::Io`] that names `path`, also if it is a folder.

@@ -1,8 +1,8 @@
-//! Files that a file names.
+//! Files whose names are read from another file.
 //!
-//! A scene of several files, a data set or a list comes from anybody, and so do the names and the links in it. A named file
-//! is read only if it is a regular file inside of the folder that the user named. A link could otherwise lead to a private
-//! file, to a pipe, which is waited for without end, or to a device, which gives bytes without end.
+//! A scene of several files, a data set or a list may come from a stranger, and so may the names and the links in it. A
+//! named file is read only if it is a regular file inside of the folder that the user named. A link could otherwise lead
+//! to a private file, to a pipe, for which a reader waits without end, or to a device, which gives bytes without end.
 
 use std::path::{Path, PathBuf};
 

@@ -1,28 +1,28 @@
-//! Limits on what a file may ask for, checked before anything is allocated.
+//! Limits on files, which are checked before anything is allocated.
 
 use crate::scene::sh::MAX_REST;
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 
-/// Most atoms a dictionary may have: indices fit in 10 bits, and the Gram matrix in 4 MiB.
+/// Largest number of atoms of a dictionary. Indices fit in 10 bits, and the Gram matrix in 4 MiB.
 pub const MAX_ATOMS: usize = 1024;
-/// Most Gaussians of a scene. Gaussians are numbered by u32, and their count is stored as u32 too.
+/// Largest number of Gaussians of a scene. Gaussians are numbered by u32, and their count is stored as u32 too.
 pub(crate) const MAX_GAUSSIANS: u64 = u32::MAX as u64 - 1;
 /// Most bytes of arrays for each byte of a file. A valid file without extra properties has at most 172: a byte of a packed
 /// file stands for at most 3 Gaussians of 57 bytes each, and an offset is stored for every 64 Gaussians. An extra property
-/// of equal values takes next to no bytes in a packed file, and adds up to 24 if the Gaussians are as short as can be.
+/// of equal values takes next to no bytes in a packed file. It adds up to 24 if the Gaussians take the fewest bits.
 const EXPANSION: u64 = 256;
 /// Most bytes of a header. The header of a packed scene of 2^32 Gaussians takes some kilobytes.
 const HEADER_BYTES: u64 = 4 << 20;
 /// Most properties of an element. INRIA's layout of SH degree 4 has 89.
 const PROPERTIES: u64 = 4096;
 
-/// How much a file may ask for.
+/// Limits on a file.
 ///
-/// A reader allocates at most a constant times the file's own size, whatever the header says, because it first
-/// compares counts with the bytes present. The constant is small except for packed files, where a byte may
-/// stand for 3 Gaussians of some hundred bytes. These limits come on top of that. By default every valid file
-/// is within them. For files of unknown origin, lower [`Self::gaussians`] or [`Self::bytes`]:
+/// A reader allocates at most a constant times the file's own size, because it first compares the counts of the header
+/// with the bytes present. The constant is small except for packed files, where a byte may stand for 3 Gaussians of some
+/// hundred bytes. These limits hold in addition. By default every valid file is within them. For files of unknown origin,
+/// lower [`Self::gaussians`] or [`Self::bytes`]:
 ///
 /// ```
 /// use lexisplat::{Error, Limits, lexi};
@@ -110,12 +110,12 @@ impl Limits {
         })
     }
 
-    /// Refuses `found` of `what` if they are over a `limit` that cannot be raised.
+    /// Refuses `found` of `what` if they are over `limit`, which cannot be raised.
     pub(crate) fn check(what: &str, found: u64, limit: u64) -> Result<()> {
         if found <= limit { Ok(()) } else { Err(Error::limit(what, found, limit, None)) }
     }
 
-    /// Refuses a file with too many Gaussians. No file may have `u32::MAX` or more. For readers of further formats.
+    /// Refuses a file with too many Gaussians. No file may have `u32::MAX` or more. It is for readers of further formats.
     ///
     /// # Errors
     /// [`Error::Limit`].
@@ -124,27 +124,27 @@ impl Limits {
         raisable("Gaussians in", file, found, self.gaussians, "gaussians")
     }
 
-    /// Refuses a file with too many atoms. More than [`MAX_ATOMS`] pass: they mean that the file is damaged, and its
-    /// reader says so.
+    /// Refuses a file with too many atoms. More than [`MAX_ATOMS`] pass, because the file is then damaged, and its
+    /// reader has an error for that.
     pub(crate) fn check_atoms(&self, file: &str, found: u64) -> Result<()> {
         let found = if found > MAX_ATOMS as u64 { 0 } else { found };
         raisable("atoms in the dictionary of", file, found, self.atoms, "atoms")
     }
 
-    /// Refuses a file whose Gaussian number `gaussian` has too many nonzeros. More than any dimension pass: they mean
-    /// that the file is damaged, and its reader says so.
+    /// Refuses a file whose Gaussian number `gaussian` has too many nonzeros. More than any dimension pass, because the
+    /// file is then damaged, and its reader has an error for that.
     pub(crate) fn check_nonzeros(&self, file: &str, gaussian: usize, found: u64) -> Result<()> {
         let found = if found > MAX_REST as u64 { 0 } else { found };
         let what = format!("nonzeros of Gaussian {gaussian} in");
         raisable(&what, file, found, self.nonzeros, "nonzeros")
     }
 
-    /// Refuses a file of too many bytes that has to be held in memory.
+    /// Refuses a file with too many bytes that must be in memory.
     pub(crate) fn check_file(&self, file: &str, found: u64) -> Result<()> {
         raisable("bytes of", file, found, self.bytes, "bytes")
     }
 
-    /// Refuses a file whose header has too many bytes. For readers of further formats.
+    /// Refuses a file whose header has too many bytes. It is for readers of further formats.
     ///
     /// # Errors
     /// [`Error::Limit`].
@@ -152,7 +152,7 @@ impl Limits {
         raisable("bytes in the header of", file, found, self.header_bytes, "header_bytes")
     }
 
-    /// Refuses a file with an element of too many properties.
+    /// Refuses a file with too many properties in an element.
     pub(crate) fn check_properties(&self, file: &str, found: u64) -> Result<()> {
         raisable("properties of an element of", file, found, self.properties, "properties")
     }

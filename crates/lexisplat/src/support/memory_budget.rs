@@ -1,13 +1,13 @@
-//! The memory that the arrays of one file may take.
+//! A bound on the memory of the arrays of one file.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 
-/// Bytes of a Gaussian's position, base colour, opacity, scales and rotation.
+/// Number of bytes of a Gaussian's position, base colour, opacity, scales and rotation.
 pub(crate) const GEOMETRY_BYTES: usize = (3 + 3 + 1 + 3 + 4) * size_of::<f32>();
-/// Bytes of a Gaussian's number of nonzeros.
+/// Number of bytes of a Gaussian's number of nonzeros.
 pub(crate) const COUNT_BYTES: usize = 1;
 
 /// The memory that [`Limits::bytes`] and [`Limits::expansion`] leave for the arrays of one file. Threads share it.
@@ -16,13 +16,13 @@ pub(crate) struct MemoryBudget<'a> {
     file: &'a str,
     file_bytes: u64,
     limit: u64,
-    /// Name of the limit that is smaller.
+    /// Name of the limit that gives the bound.
     name: &'static str,
     used: AtomicU64,
 }
 
 impl<'a> MemoryBudget<'a> {
-    /// The budget of `file`, as the caller named it, which has `file_bytes` bytes.
+    /// Creates the budget of `file`, by the name that the caller gave, of `file_bytes` bytes.
     pub(crate) fn new(limits: &Limits, file: &'a str, file_bytes: u64) -> Self {
         let expanded = limits.expansion.saturating_mul(file_bytes);
         let (limit, name) =
@@ -38,14 +38,14 @@ impl<'a> MemoryBudget<'a> {
         if used <= self.limit { Ok(()) } else { Err(self.error(used, "")) }
     }
 
-    /// [`Self::take`] for several threads at a time. Returns whether the budget was large enough.
+    /// Does the same as [`Self::take`], for several threads. Returns whether the budget was large enough.
     pub(crate) fn grow(&self, count: usize, each: usize) -> bool {
         let bytes = (count as u64).saturating_mul(each as u64);
         self.used.fetch_add(bytes, Relaxed).saturating_add(bytes) <= self.limit
     }
 
-    /// The error after [`Self::grow`] returned false. It does not depend on the thread that noticed first, so it
-    /// does not say how much is missing.
+    /// Returns the error after [`Self::grow`] returned false. It does not depend on the thread that noticed first, so it has
+    /// no number of missing bytes.
     pub(crate) fn full(&self) -> Error {
         self.error(self.limit.saturating_add(1), " (at least)")
     }
@@ -60,7 +60,7 @@ impl<'a> MemoryBudget<'a> {
 
 impl Limits {
     /// Refuses `count` Gaussians of `each` bytes in memory, made from a file of `file_bytes` bytes, if [`Self::bytes`] or
-    /// [`Self::expansion`] do not allow them. For readers of further formats.
+    /// [`Self::expansion`] do not allow them. It is for readers of further formats.
     ///
     /// # Errors
     /// [`Error::Limit`].

@@ -1,12 +1,12 @@
 //! The choice of vector instructions for long loops. It changes their speed, never their results.
 //!
-//! The long loops of this workspace are additions and multiplications, each rounded, over lanes that never meet.
-//! The compiler can therefore use registers of any width, and the bits stay the same. By default the widest
-//! registers of the CPU are used. [`Simd::scope`] chooses others, to test that the bits are the same or to work
-//! around a faulty CPU.
+//! The long loops of this workspace are additions and multiplications, each rounded, over lanes that never meet. The
+//! compiler can therefore use registers of any width, and the bits stay the same. By default the loops use the widest
+//! registers of the CPU. [`Simd::scope`] chooses others, to test that the bits are the same or to work around a faulty
+//! CPU.
 //!
-//! The choice is a value of the calling thread, and loops hand it on to the threads that work for them. The only
-//! state of the process is what `std` remembers of the CPU's features, which never changes.
+//! The choice is a value of the calling thread, and loops pass it on to their worker threads. The only state of the process
+//! is the list of CPU features in `std`, which never changes.
 
 use std::cell::Cell;
 

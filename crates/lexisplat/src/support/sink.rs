@@ -10,7 +10,7 @@ use crate::support::progress::{Progress, Stage};
 /// Number of bytes passed on at a time. Between two such blocks, the work can be cancelled.
 const BLOCK: usize = 1 << 20;
 
-/// The target of a result: a file that appears when it is whole, or any writer.
+/// The target of a result: a file that appears when it is whole, or a writer.
 ///
 /// Paths, [`Output`]s and mutable references to writers convert into a sink:
 ///

@@ -181,17 +181,17 @@ mod tests {
         for to in [SpillTo::Memory, SpillTo::Folder(folder.path())] {
             let spilled = || {
                 let mut spill = Spill::new(to).unwrap();
-                values.chunks(777).for_each(|part| spill.push(part).unwrap());
+                values.chunks(777).for_each(|block| spill.push(block).unwrap());
                 spill.finish().unwrap()
             };
             assert_eq!(spilled().checksum, crc32fast::hash(expected));
             let mut found = Vec::new();
             spilled().copy_to(&mut found).unwrap();
             assert!(found == expected);
-            let mut parts = spilled();
-            assert_eq!(parts.take::<u32>(3).unwrap(), [0, 1, 2]);
-            assert_eq!(parts.take::<u32>(values.len() - 3).unwrap(), values[3..]);
-            assert!(parts.take::<u8>(1).is_err());
+            let mut taken = spilled();
+            assert_eq!(taken.take::<u32>(3).unwrap(), [0, 1, 2]);
+            assert_eq!(taken.take::<u32>(values.len() - 3).unwrap(), values[3..]);
+            assert!(taken.take::<u8>(1).is_err());
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }

@@ -112,7 +112,7 @@ const SEAL: u64 = 4;
 /// Bytes that an opened packed file takes: head without its checksum and data as they lie, order and extras as numbers.
 pub(crate) fn packed_bytes(packed: &lexisplat::packed::Packed) -> u64 {
     let writer = LexiWriter::packed(packed);
-    let attributes = writer.attribute_bytes();
+    let attributes = writer.tensor_bytes();
     let lie = attributes.iter().filter(|t| ["packed.head", "packed.data"].contains(&t.0.as_str()));
     let extras = packed.extras().iter().map(|e| match &e.values {
         ExtraValues::U16(values) => size_of_val(values.as_slice()),

@@ -20,7 +20,7 @@ const GAUSSIANS: usize = 20_000;
 fn file() -> &'static [u8] {
     static FILE: OnceLock<Vec<u8>> = OnceLock::new();
     FILE.get_or_init(|| {
-        let options = options(|o| o.viewpoints = vec![[0.0, -1.0, -4.0], [3.0, -1.0, 2.0]]);
+        let options = options(|o| o.points_of_view = vec![[0.0, -1.0, -4.0], [3.0, -1.0, 2.0]]);
         bytes(&pack(&sample(GAUSSIANS, 5, 2), STEP, &options).0)
     })
 }

@@ -19,7 +19,7 @@ fn assert_travels(packed: &Packed, what: &str) {
     assert_eq!(&packed.unpack_dictionary().unwrap(), model.dictionary(), "{what}");
     let writer = LexiWriter::packed(packed);
     assert_eq!(writer.file_bytes(), bytes.len() as u64, "{what}");
-    assert_eq!(writer.attribute_bytes(), reader.attribute_bytes(), "{what}");
+    assert_eq!(writer.tensor_bytes(), reader.tensor_bytes(), "{what}");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use lexisplat::Record;
 use lexisplat::lexi::LexiReader;
 use lexisplat::packed::{ReachedRecord, StreamBits, TargetRecord};
 use lexisplat::stream::Survey;
-use lexisplat_compress::{ByteCount, RecordReport, part_bytes, sh_bytes};
+use lexisplat_compress::{ByteCount, RecordReport, attribute_bytes, sh_bytes};
 use lexisplat_eval::format;
 use serde::Serialize;
 
@@ -70,7 +70,7 @@ struct PackedFacts<'a> {
 
 /// Returns the number of bytes of each part of the file, by name.
 pub(super) fn parts(lexi: &LexiReader<'_>, survey: &Survey) -> Vec<(String, f64)> {
-    part_bytes(lexi.attribute_bytes(), &survey.stream_bits)
+    attribute_bytes(lexi.tensor_bytes(), &survey.stream_bits)
 }
 
 impl<'a> LexiFacts<'a> {

@@ -30,7 +30,7 @@ const LANES: usize = 8;
 
 /// Range of the pixel values that are the input of the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Range {
+pub enum PixelRange {
     /// -1..1, the range for which the constants are made. The `lpips` package uses it.
     Standard,
     /// 0..1. `metrics.py` of the 3DGS repository uses this range, so tables of 3DGS papers have it (its issue 1239).
@@ -90,7 +90,7 @@ impl Lpips {
     /// # Errors
     /// [`Error::Parameter`] if the sizes differ, if a picture has NaN or is smaller than [`Network::min_size`], or if the
     /// weights make the features overflow.
-    pub fn distance(&self, a: &Image, b: &Image, range: Range) -> Result<f64> {
+    pub fn distance(&self, a: &Image, b: &Image, range: PixelRange) -> Result<f64> {
         comparable(a, b)?;
         let (mut a, mut b) = (self.input(a, range)?, self.input(b, range)?);
         let mut total = 0.0;
@@ -102,7 +102,7 @@ impl Lpips {
     }
 
     /// Returns the picture in the form in which the first layer reads it.
-    fn input(&self, image: &Image, range: Range) -> Result<Map> {
+    fn input(&self, image: &Image, range: PixelRange) -> Result<Map> {
         if image.width.min(image.height) < self.network.min_size() {
             return Err(self.too_small(image.width, image.height));
         }
@@ -117,7 +117,7 @@ impl Lpips {
                 for (to, pixel) in to.zip(&image.pixels[y * width..(y + 1) * width]) {
                     for (c, (to, &value)) in to.iter_mut().zip(pixel).enumerate() {
                         let value = clip(value);
-                        let value = if range == Range::Standard { 2.0 * value - 1.0 } else { value };
+                        let value = if range == PixelRange::Standard { 2.0 * value - 1.0 } else { value };
                         *to = (value - SHIFT[c]) / SCALE[c];
                     }
                 }

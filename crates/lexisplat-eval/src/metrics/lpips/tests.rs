@@ -9,7 +9,7 @@ use crate::metrics::testing::{golden, picture};
 const GOLDEN: [(Network, [f64; 2]); 2] =
     [(Network::Vgg, [0.116_218_292, 0.040_702_511]), (Network::Alex, [0.167_361_122, 0.068_707_894])];
 
-const RANGES: [Range; 2] = [Range::Standard, Range::Inria];
+const RANGES: [PixelRange; 2] = [PixelRange::Standard, PixelRange::Inria];
 
 #[test]
 fn agrees_with_the_published_package() {
@@ -41,12 +41,12 @@ fn colours_are_clipped_first() {
     let a = picture(36, 32, 1);
     let clipped = Image { pixels: a.pixels.iter().map(|p| p.map(clip)).collect(), ..a.clone() };
     assert!(a != clipped, "some values must lie outside 0..1");
-    assert!(lpips.distance(&a, &clipped, Range::Standard).unwrap().abs() < 1e-300);
+    assert!(lpips.distance(&a, &clipped, PixelRange::Standard).unwrap().abs() < 1e-300);
     let mut odd = a.clone();
     odd.pixels[5] = [0.0, f32::INFINITY, f32::NEG_INFINITY];
-    assert!(lpips.distance(&a, &odd, Range::Inria).unwrap() > 0.0);
+    assert!(lpips.distance(&a, &odd, PixelRange::Inria).unwrap() > 0.0);
     odd.pixels[5][0] = f32::NAN;
-    assert!(lpips.distance(&a, &odd, Range::Inria).is_err());
+    assert!(lpips.distance(&a, &odd, PixelRange::Inria).is_err());
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn pictures_too_small_for_the_pools_are_refused() {
         assert!(map.is_none(), "{network}");
     }
     let lpips = random(Network::Alex, 1);
-    assert!(lpips.distance(&picture(40, 41, 1), &picture(41, 40, 1), Range::Standard).is_err());
+    assert!(lpips.distance(&picture(40, 41, 1), &picture(41, 40, 1), PixelRange::Standard).is_err());
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn weights_that_overflow_give_no_number() {
     let shape = |name: &str| if name.starts_with("features") { f32::MAX } else { 1.0 };
     let get = |name: &str, sizes: &[usize]| Ok(vec![shape(name); sizes.iter().product()]);
     let lpips = Lpips::build(Network::Alex, get).unwrap();
-    let error = lpips.distance(&picture(40, 40, 1), &picture(40, 40, 2), Range::Standard).unwrap_err();
+    let error = lpips.distance(&picture(40, 40, 1), &picture(40, 40, 2), PixelRange::Standard).unwrap_err();
     assert!(error.to_string().contains("overflow"), "{error}");
 }
 
@@ -90,7 +90,7 @@ fn threads_do_not_change_the_distance() {
     let lpips = random(Network::Alex, 4);
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| lpips.distance(&a, &b, Range::Standard)).unwrap().to_bits()
+        pool.install(|| lpips.distance(&a, &b, PixelRange::Standard)).unwrap().to_bits()
     };
     assert_eq!(on(1), on(3));
 }

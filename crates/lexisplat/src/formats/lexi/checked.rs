@@ -30,12 +30,12 @@ pub(super) struct Checked<'a> {
     pub(super) file_bytes: u64,
 }
 
-/// The part of a file that must be there.
+/// The bytes of a file that must be there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Extent {
     /// All bytes of the file.
     Whole,
-    /// A first part of the file, which must be packed.
+    /// A first part of the file, without its last bytes. The file must be packed.
     First,
 }
 
@@ -126,7 +126,7 @@ impl<'a> Checked<'a> {
     }
 
     fn verify_tensors(&self) -> Result<()> {
-        // The ranges of packed data have checksums of their own, so that a part of the data can be checked.
+        // The ranges of packed data have checksums of their own, so each range can be checked alone.
         let (packed, elsewhere): (bool, &[&str]) = match self.is_packed() && self.has(tensor::HEAD) {
             true => (true, &[tensor::HEAD, tensor::DATA]),
             false => (false, &[tensor::HEADER_CHECKSUM]),
@@ -146,7 +146,7 @@ impl<'a> Checked<'a> {
             };
             return Err(self.malformed(format!("metadata 'checksums' names '{name}', {why}")));
         }
-        // Of a first part too, the sums of all tensors must be listed.
+        // The sums of all tensors must be listed, also in a first part of a file.
         let listed = |name: &str| sums.get(name).and_then(Json::text).unwrap_or_default();
         if let Some(name) = names.iter().find(|name| !is_sum(listed(name))) {
             let text =
@@ -156,7 +156,7 @@ impl<'a> Checked<'a> {
         names.retain(|name| self.is_there(name));
         let found = map_chunks(names.len(), 1, |range| {
             let name = names[range.start];
-            self.view(name).map(|t| format!("{:08x}", crc32::hash(t.data)))
+            self.tensor(name).map(|t| format!("{:08x}", crc32::hash(t.data)))
         });
         for (name, sum) in names.iter().zip(found) {
             if sum.ok().as_deref() != Some(listed(name)) {
@@ -189,13 +189,13 @@ impl<'a> Checked<'a> {
     fn is_there(&self, name: &str) -> bool {
         self.header
             .info(name)
-            .is_some_and(|tensor| tensor.data_offsets.1 <= self.bytes().len() - self.data_start)
+            .is_some_and(|tensor| tensor.data_offsets.end <= self.bytes().len() - self.data_start)
     }
 
     /// Returns the position at which the tensor `name` starts in the file, its length, and its first bytes, as many as are
     /// there.
     pub(super) fn first_of(&self, name: &str) -> Option<(u64, u64, &[u8])> {
-        let (start, end) = self.header.info(name)?.data_offsets;
+        let Range { start, end } = self.header.info(name)?.data_offsets;
         let place = |offset: usize| self.data_start.saturating_add(offset);
         let there = |offset: usize| place(offset).min(self.bytes().len());
         Some((place(start) as u64, (end - start) as u64, self.bytes().get(there(start)..there(end))?))
@@ -269,16 +269,16 @@ impl<'a> Checked<'a> {
         (*self.bytes).as_ref()
     }
 
-    pub(super) fn view(&self, name: &str) -> Result<TensorView<'_>> {
+    pub(super) fn tensor(&self, name: &str) -> Result<StoredTensor<'_>> {
         let missing = || self.malformed(format!("tensor '{name}' is missing"));
-        let TensorInfo { dtype, shape, data_offsets: (start, end) } =
+        let TensorInfo { dtype, shape, data_offsets: Range { start, end } } =
             self.header.info(name).ok_or_else(missing)?;
         let (start, end) = (self.data_start.saturating_add(*start), self.data_start.saturating_add(*end));
         let data = self.bytes().get(start..end).ok_or_else(|| {
             let (what, found) = (format!("tensor '{name}'"), self.bytes().len() as u64);
             Error::format(&self.file, FormatError::Truncated { what, expected: end as u64, found })
         })?;
-        Ok(TensorView { dtype: *dtype, shape, data })
+        Ok(StoredTensor { dtype: *dtype, shape, data })
     }
 
     /// Refuses the tensor `name` unless it is a list of bytes. The header alone says so, so the bytes need not be there.
@@ -292,7 +292,7 @@ impl<'a> Checked<'a> {
 
     /// Returns the length of the tensor `name`, which must have one dimension.
     pub(super) fn list_len(&self, name: &str) -> Result<usize> {
-        match self.view(name)?.shape {
+        match self.tensor(name)?.shape {
             [len] => Ok(*len),
             shape => Err(self.malformed(format!("tensor '{name}' has shape {shape:?}"))),
         }
@@ -311,13 +311,15 @@ impl<'a> Checked<'a> {
 
     /// Returns the bytes of the tensor `name`, which must have this type and shape.
     pub(super) fn data(&self, name: &str, dtype: Dtype, shape: &[usize]) -> Result<&[u8]> {
-        let view = self.view(name)?;
-        if view.dtype != dtype || view.shape != shape {
-            let text =
-                format!("tensor '{name}' is {:?} {:?}, expected {dtype:?} {shape:?}", view.dtype, view.shape);
+        let found = self.tensor(name)?;
+        if found.dtype != dtype || found.shape != shape {
+            let text = format!(
+                "tensor '{name}' is {:?} {:?}, expected {dtype:?} {shape:?}",
+                found.dtype, found.shape
+            );
             return Err(self.malformed(text));
         }
-        Ok(view.data)
+        Ok(found.data)
     }
 
     /// Returns a copy of the tensor `name`, which must have this type and shape.
@@ -331,7 +333,7 @@ impl<'a> Checked<'a> {
     }
 
     /// Returns a copy of rows `range` of the tensor `name`, which must have this type and shape.
-    pub(super) fn part<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+    pub(super) fn rows<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
         &self,
         name: &str,
         dtype: Dtype,
@@ -372,7 +374,7 @@ pub(super) fn header_end(file: &str, bytes: &[u8], limits: &Limits) -> Result<u6
 pub(super) fn start_end(file: &str, bytes: &[u8], header_end: u64) -> Result<u64> {
     let header = usize::try_from(header_end).ok().and_then(|end| bytes.get(..end)).unwrap_or_default();
     let header = read_header(file, header)?;
-    let end = |name| header.info(name).map_or(0, |tensor| tensor.data_offsets.1 as u64);
+    let end = |name| header.info(name).map_or(0, |tensor| tensor.data_offsets.end as u64);
     Ok(header_end.saturating_add(end(tensor::HEADER_CHECKSUM).max(end(tensor::HEAD))))
 }
 
@@ -383,7 +385,7 @@ fn read_header(file: &str, bytes: &[u8]) -> Result<Header> {
 
 /// One tensor of a file.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TensorView<'a> {
+pub(super) struct StoredTensor<'a> {
     pub(super) dtype: Dtype,
     pub(super) shape: &'a [usize],
     pub(super) data: &'a [u8],

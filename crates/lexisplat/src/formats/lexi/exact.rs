@@ -44,7 +44,7 @@ pub(super) struct Exact<'a> {
 impl<'a> Exact<'a> {
     /// Checks everything in `checked` except the codes themselves.
     pub(super) fn open(checked: Checked<'a>, limits: &Limits) -> Result<Self> {
-        let n = match checked.view(tensor::POSITION)?.shape {
+        let n = match checked.tensor(tensor::POSITION)?.shape {
             [n, 3] => *n,
             shape => {
                 return Err(checked.malformed(format!("tensor 'position' has shape {shape:?}, not [N, 3]")));
@@ -82,7 +82,7 @@ impl<'a> Exact<'a> {
         self.dictionary = dictionary(checked, degree, &self.limits)?;
         self.nonzeros = checked.list_len(tensor::VALUES)?;
         let paper = self.layout == Layout::Paper;
-        if paper && checked.part::<i32>(tensor::POINTERS, Dtype::I32, &[n + 1], &(0..1))? != [0] {
+        if paper && checked.rows::<i32>(tensor::POINTERS, Dtype::I32, &[n + 1], &(0..1))? != [0] {
             return Err(checked.malformed("tensor 'codes.pointers' does not begin with 0"));
         }
         let mut total = 0_usize;
@@ -130,15 +130,15 @@ impl<'a> Exact<'a> {
         let (checked, n) = (&self.checked, self.gaussians);
         let budget = self.budget_for_geometry(range.len())?;
         let geometry = Geometry {
-            positions: checked.part(tensor::POSITION, Dtype::F32, &[n, 3], &range)?,
+            positions: checked.rows(tensor::POSITION, Dtype::F32, &[n, 3], &range)?,
             normals: match self.normals {
-                true => checked.part(tensor::NORMAL, Dtype::F32, &[n, 3], &range)?,
+                true => checked.rows(tensor::NORMAL, Dtype::F32, &[n, 3], &range)?,
                 false => Vec::new(),
             },
-            dc: checked.part(tensor::DC, Dtype::F32, &[n, 3], &range)?,
-            opacities: checked.part(tensor::OPACITY, Dtype::F32, &[n], &range)?,
-            scales: checked.part(tensor::SCALE, Dtype::F32, &[n, 3], &range)?,
-            rotations: checked.part(tensor::ROTATION, Dtype::F32, &[n, 4], &range)?,
+            dc: checked.rows(tensor::DC, Dtype::F32, &[n, 3], &range)?,
+            opacities: checked.rows(tensor::OPACITY, Dtype::F32, &[n], &range)?,
+            scales: checked.rows(tensor::SCALE, Dtype::F32, &[n, 3], &range)?,
+            rotations: checked.rows(tensor::ROTATION, Dtype::F32, &[n, 4], &range)?,
             extras: extras(checked, n, &range)?,
         };
         let none = Values::empty(self.layout.values());
@@ -181,10 +181,10 @@ impl<'a> Exact<'a> {
     fn counts(&self, range: Range<usize>) -> Result<Vec<u8>> {
         let (checked, n) = (&self.checked, self.gaussians);
         if self.layout != Layout::Paper {
-            return checked.part(tensor::COUNTS, Dtype::U8, &[n], &range);
+            return checked.rows(tensor::COUNTS, Dtype::U8, &[n], &range);
         }
         let ends = range.start..range.end + 1;
-        let pointers: Vec<i32> = checked.part(tensor::POINTERS, Dtype::I32, &[n + 1], &ends)?;
+        let pointers: Vec<i32> = checked.rows(tensor::POINTERS, Dtype::I32, &[n + 1], &ends)?;
         let count = |pair: &[i32]| u8::try_from(i64::from(pair[1]) - i64::from(pair[0])).ok();
         pointers.windows(2).map(count).collect::<Option<Vec<u8>>>().ok_or_else(|| {
             checked.malformed("tensor 'codes.pointers' is not monotonic with steps of at most 255")
@@ -195,16 +195,16 @@ impl<'a> Exact<'a> {
     fn read_codes(&self, range: Range<usize>) -> Result<(Indices, Values)> {
         let (checked, all) = (&self.checked, [self.nonzeros]);
         let values = if self.layout.values() == ValueType::F16 {
-            let bits: Vec<u16> = checked.part(tensor::VALUES, Dtype::F16, &all, &range)?;
+            let bits: Vec<u16> = checked.rows(tensor::VALUES, Dtype::F16, &all, &range)?;
             Values::F16(bits.into_iter().map(f16::from_bits).collect())
         } else {
-            Values::F32(checked.part(tensor::VALUES, Dtype::F32, &all, &range)?)
+            Values::F32(checked.rows(tensor::VALUES, Dtype::F32, &all, &range)?)
         };
         let small = matches!(Indices::for_atoms(self.dictionary.len()), Indices::U8(_));
         let bad = |i: i32| checked.malformed(format!("tensor 'codes.indices' holds {i}"));
         let indices = match (self.layout, small) {
             (Layout::Paper, _) => {
-                let wide: Vec<i32> = checked.part(tensor::INDICES, Dtype::I32, &all, &range)?;
+                let wide: Vec<i32> = checked.rows(tensor::INDICES, Dtype::I32, &all, &range)?;
                 let wide = wide.into_iter();
                 if small {
                     Indices::U8(wide.map(|i| u8::try_from(i).map_err(|_| bad(i))).collect::<Result<_>>()?)
@@ -212,15 +212,15 @@ impl<'a> Exact<'a> {
                     Indices::U16(wide.map(|i| u16::try_from(i).map_err(|_| bad(i))).collect::<Result<_>>()?)
                 }
             }
-            (_, true) => Indices::U8(checked.part(tensor::INDICES, Dtype::U8, &all, &range)?),
-            (_, false) => Indices::U16(checked.part(tensor::INDICES, Dtype::U16, &all, &range)?),
+            (_, true) => Indices::U8(checked.rows(tensor::INDICES, Dtype::U8, &all, &range)?),
+            (_, false) => Indices::U16(checked.rows(tensor::INDICES, Dtype::U16, &all, &range)?),
         };
         Ok((indices, values))
     }
 
     /// Returns the numbers of the Gaussians of escapes `range`.
     fn escaped(&self, range: Range<usize>) -> Result<Vec<u32>> {
-        self.checked.part(tensor::ESCAPED, Dtype::U32, &[self.escapes], &range)
+        self.checked.rows(tensor::ESCAPED, Dtype::U32, &[self.escapes], &range)
     }
 
     /// Returns the range of the escapes that are of Gaussians `range`.
@@ -249,7 +249,7 @@ impl<'a> Exact<'a> {
         let start = u32::try_from(range.start).unwrap_or(u32::MAX);
         gaussians.iter_mut().for_each(|g| *g -= start);
         let shape = [self.escapes, self.dictionary.dim()];
-        Ok(Escapes { gaussians, rows: self.checked.part(tensor::ESCAPE_ROWS, Dtype::F32, &shape, escaped)? })
+        Ok(Escapes { gaussians, rows: self.checked.rows(tensor::ESCAPE_ROWS, Dtype::F32, &shape, escaped)? })
     }
 }
 
@@ -279,7 +279,7 @@ fn all_finite(checked: &Checked<'_>, n: usize, normals: bool) -> Result<()> {
     for (name, width, shape) in arrays {
         let (mut count, mut first) = (0_u64, None);
         for start in (0..n).step_by(BLOCK) {
-            let values: Vec<f32> = checked.part(name, Dtype::F32, &shape, &(start..n.min(start + BLOCK)))?;
+            let values: Vec<f32> = checked.rows(name, Dtype::F32, &shape, &(start..n.min(start + BLOCK)))?;
             let bad = values.chunks_exact(width).enumerate();
             for (i, _) in bad.filter(|(_, row)| row.iter().any(|v| !v.is_finite())) {
                 count += 1;

@@ -19,7 +19,7 @@ pub(super) struct ExactTensors<'a> {
     pub(super) gaussians: usize,
     pub(super) nonzeros: usize,
     pub(super) escapes: usize,
-    /// Counts, or the pointers of layout `paper`.
+    /// The counts, or the pointers of layout `paper`.
     pub(super) counts: Source<'a>,
     pub(super) indices: Source<'a>,
     pub(super) values: Source<'a>,
@@ -58,7 +58,7 @@ impl<'a> ExactTensors<'a> {
         }
     }
 
-    /// The tensors in the order in which sizes are listed.
+    /// Returns the tensors in the order in which sizes are listed.
     pub(super) fn list(self, dictionary: &'a Dictionary, layout: Layout) -> Vec<Tensor<'a>> {
         let (n, nonzeros, escapes) = (self.gaussians, self.nonzeros, self.escapes);
         let mut out = self.geometry;
@@ -88,7 +88,7 @@ impl<'a> ExactTensors<'a> {
     }
 }
 
-/// The tensors of the geometry of `n` Gaussians. `arrays` are in the order of [`GEOMETRY`] and may lack the normals.
+/// Returns the tensors of the geometry of `n` Gaussians. `arrays` are in the order of [`GEOMETRY`] and may lack the normals.
 pub(super) fn geometry_tensors<'a>(
     n: usize,
     arrays: impl IntoIterator<Item = Source<'a>>,
@@ -98,7 +98,7 @@ pub(super) fn geometry_tensors<'a>(
     GEOMETRY.into_iter().zip(arrays).map(tensor)
 }
 
-/// The tensor of a property that 3DGS does not define.
+/// Returns the tensor of a property that 3DGS does not define.
 pub(super) fn extra_tensor<'a>(extra: &Extra, n: usize, source: Source<'a>) -> Tensor<'a> {
     let dtype = extra.values.scalar_type().dtype();
     Tensor::new(&format!("{EXTRA_PREFIX}{}", extra.name), dtype, &[n], source)
@@ -108,8 +108,8 @@ fn bytes_of(extra: &Extra) -> Source<'_> {
     for_extra!(&extra.values, v => Source::of(v))
 }
 
-/// Where the codes of each Gaussian end, if `before` nonzeros come before them. The caller has checked that
-/// an i32 can count them.
+/// Returns the end of the codes of each Gaussian, if `before` nonzeros come before them. The caller has checked that an i32
+/// can hold the ends.
 pub(super) fn paper_pointers(counts: &[u8], before: i32) -> impl Iterator<Item = u32> + '_ {
     counts.iter().scan(before, |end, &count| {
         *end = end.wrapping_add(i32::from(count));
@@ -117,18 +117,18 @@ pub(super) fn paper_pointers(counts: &[u8], before: i32) -> impl Iterator<Item =
     })
 }
 
-/// Indices as i32.
+/// Returns indices as i32.
 pub(super) fn paper_indices(indices: &Indices) -> impl Iterator<Item = u32> + '_ {
     #[expect(clippy::cast_possible_truncation, reason = "an index is a u16 at most")]
     (0..indices.len()).map(|k| indices.get(k) as u32)
 }
 
-/// The bits of values as f32.
+/// Returns the bits of values as f32.
 pub(super) fn paper_values(values: &Values) -> impl Iterator<Item = u32> + '_ {
     (0..values.len()).map(|k| values.get(k).to_bits())
 }
 
-/// Refuses more nonzeros than the pointers of layout `paper` count.
+/// Refuses more nonzeros than the pointers of layout `paper` can count.
 pub(super) fn check_pointers(nonzeros: u64) -> Result<()> {
     let largest = i32::MAX.unsigned_abs().into();
     Limits::check("nonzeros in layout 'paper', whose pointers are i32", nonzeros, largest)

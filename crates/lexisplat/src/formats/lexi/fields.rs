@@ -71,7 +71,7 @@ fn offset(checked: &Checked<'_>) -> Result<Option<Offset>> {
 /// Returns the dictionary of a scene or of a dictionary file.
 pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree, limits: &Limits) -> Result<Dictionary> {
     let dim = degree.rest();
-    let atoms = match checked.view(tensor::DICTIONARY)?.shape {
+    let atoms = match checked.tensor(tensor::DICTIONARY)?.shape {
         [atoms, width] if *width == dim && (1..=MAX_ATOMS).contains(atoms) => *atoms,
         shape => {
             let text = format!("tensor 'dictionary' has shape {shape:?}, not [1 to {MAX_ATOMS}, {dim}]");
@@ -150,10 +150,10 @@ pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> R
             out.push(Extra { name: name.to_owned(), values });
             continue;
         }
-        let dtype = checked.view(full)?.dtype;
+        let dtype = checked.tensor(full)?.dtype;
         let ty = ScalarType::of_dtype(dtype)
             .ok_or_else(|| checked.malformed(format!("tensor '{full}' has type {dtype:?}")))?;
-        let values = with_scalar!(ty, T => checked.part::<T>(full, dtype, &[n], range)?.into());
+        let values = with_scalar!(ty, T => checked.rows::<T>(full, dtype, &[n], range)?.into());
         out.push(Extra { name: name.to_owned(), values });
     }
     Ok(out)

@@ -1,5 +1,7 @@
 //! The JSON header of a safetensors file: its metadata, and the positions of its tensors.
 
+use std::ops::Range;
+
 use safetensors::Dtype;
 
 use super::json::Json;
@@ -29,8 +31,8 @@ const DTYPES: [(&str, Dtype); 13] = [
 pub(super) struct TensorInfo {
     pub(super) dtype: Dtype,
     pub(super) shape: Vec<usize>,
-    /// Start and end of the tensor, counted from the end of the header.
-    pub(super) data_offsets: (usize, usize),
+    /// The bytes of the tensor, counted from the end of the header.
+    pub(super) data_offsets: Range<usize>,
 }
 
 /// Tensors that lie one after another, and metadata.
@@ -43,7 +45,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Reads the JSON `text`. The error says what is wrong with it.
+    /// Reads the JSON `text`. The error is the fault of the text.
     pub(super) fn read(text: &[u8]) -> Result<Self, String> {
         if text.first() != Some(&b'{') {
             return Err(invalid("byte 8 is not '{'"));
@@ -74,7 +76,7 @@ impl Header {
     fn check(&self) -> Result<(), String> {
         let mut last = 0;
         for (name, tensor) in self.by_place() {
-            let (start, end) = tensor.data_offsets;
+            let Range { start, end } = tensor.data_offsets;
             if start != last || end < start {
                 return Err(invalid(&format!("invalid offset for tensor `{name}`")));
             }
@@ -90,7 +92,7 @@ impl Header {
 
     /// Returns the number of bytes of all tensors.
     pub(super) fn data_bytes(&self) -> usize {
-        self.tensors.iter().map(|(_, tensor)| tensor.data_offsets.1).max().unwrap_or(0)
+        self.tensors.iter().map(|(_, tensor)| tensor.data_offsets.end).max().unwrap_or(0)
     }
 
     pub(super) fn info(&self, name: &str) -> Option<&TensorInfo> {
@@ -105,7 +107,9 @@ impl Header {
 
     /// Returns all tensors in the order in which they lie.
     pub(super) fn by_place(&self) -> Vec<&(String, TensorInfo)> {
-        let start = |k: usize| self.tensors.get(k).map(|tensor| tensor.1.data_offsets);
+        let start = |k: usize| {
+            self.tensors.get(k).map(|(_, tensor)| (tensor.data_offsets.start, tensor.data_offsets.end))
+        };
         let places = order(self.tensors.len(), &mut |a, b| start(a).cmp(&start(b)));
         places.into_iter().filter_map(|k| self.tensors.get(k)).collect()
     }
@@ -127,7 +131,7 @@ fn tensor(value: &Json) -> Result<TensorInfo, &'static str> {
     let place = || {
         let shape = value.get("shape")?.items()?.iter().map(Json::number).collect::<Option<_>>()?;
         let [start, end] = value.get("data_offsets")?.items()? else { return None };
-        Some(TensorInfo { dtype, shape, data_offsets: (start.number()?, end.number()?) })
+        Some(TensorInfo { dtype, shape, data_offsets: start.number()?..end.number()? })
     };
     place().ok_or("is not described")
 }
@@ -172,8 +176,8 @@ mod tests {
                     assert!(metadata.clone().all(|(key, text)| own.text(key) == Some(text)), "{shown}");
                     for name in &names {
                         let (own, other) = (own.info(name).unwrap(), other.info(name).unwrap());
-                        let other = (other.dtype, &other.shape, other.data_offsets);
-                        assert_eq!((own.dtype, &own.shape, own.data_offsets), other, "{shown}");
+                        let other = (other.dtype, &other.shape, other.data_offsets.0..other.data_offsets.1);
+                        assert_eq!((own.dtype, &own.shape, own.data_offsets.clone()), other, "{shown}");
                     }
                     let mut others = other.offset_keys();
                     names.sort_unstable();

@@ -23,7 +23,7 @@ pub(super) enum Json {
 }
 
 impl Json {
-    /// Parses the value in `text`. The error says what is wrong with it.
+    /// Parses the value in `text`. The error is the fault of the text.
     pub(super) fn parse(text: &[u8]) -> Result<Self, String> {
         let mut parser = Parser { text, at: 0 };
         let value = parser.value(MOST_DEPTH)?;

@@ -30,5 +30,4 @@ pub use reader::{LexiReader, read, read_bytes};
 pub use schema::{MAX_VERSION, PACKED_VERSION, VERSION};
 #[cfg(feature = "encode")]
 pub(crate) use spilled::SpilledModel;
-pub(crate) use write::sh_bytes;
 pub use write::{LexiWriter, write};

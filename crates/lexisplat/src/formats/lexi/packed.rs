@@ -56,7 +56,7 @@ pub(super) fn has_order(checked: &Checked<'_>) -> bool {
 }
 
 fn length(checked: &Checked<'_>, name: &str, dtype: Dtype) -> Result<[usize; 1]> {
-    match checked.view(name)?.shape {
+    match checked.tensor(name)?.shape {
         [len] => Ok([*len]),
         shape => Err(checked.malformed(format!("tensor '{name}' is {dtype:?} {shape:?}, not a list"))),
     }
@@ -85,7 +85,7 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     let target = checked.has_text(key::TARGET).then(|| checked.json(key::TARGET, target)).transpose()?;
     let reached = checked.has_text(key::REACHED).then(|| checked.json(key::REACHED, reached)).transpose()?;
     check_extra_names(checked)?;
-    // Of a first part too: the header has the types and shapes of tensors that are not there yet.
+    // A first part of a file has this too: its header has the types and shapes of tensors that are not there yet.
     checked.must_be_bytes(tensor::DATA)?;
     let columns = |name: &&str| *name == tensor::ORDER || name.starts_with(EXTRA_PREFIX);
     checked.names().filter(columns).try_for_each(|name| checked.must_be_bytes(name))?;

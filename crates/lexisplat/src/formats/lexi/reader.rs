@@ -57,7 +57,7 @@ pub struct LexiReader<'a> {
     limits: Limits,
     /// Names and types of extras, without values.
     extras: Vec<Extra>,
-    attribute_bytes: Vec<(String, u64)>,
+    tensor_bytes: Vec<(String, u64)>,
 }
 
 #[derive(Debug)]
@@ -113,7 +113,7 @@ impl<'a> LexiReader<'a> {
     fn with_extent(file: String, bytes: FileBytes<'a>, extent: Extent, limits: &Limits) -> Result<Self> {
         let checked = Checked::open(file, bytes, &[FORMAT], extent, limits)?;
         let layout = layout(&checked)?;
-        let attribute_bytes = sizes(&checked)?;
+        let tensor_bytes = sizes(&checked)?;
         let (kind, extras) = if layout == Layout::Packed {
             let mut head = super::packed::head(&checked, limits)?;
             super::packed::check_columns(&checked, head.gaussians)?;
@@ -130,16 +130,16 @@ impl<'a> LexiReader<'a> {
             let extras = extras(&exact.checked, exact.gaussians, &(0..0))?;
             (Kind::Exact(Box::new(exact)), extras)
         };
-        Ok(Self { kind, layout, limits: *limits, extras, attribute_bytes })
+        Ok(Self { kind, layout, limits: *limits, extras, tensor_bytes })
     }
 
-    /// Decodes at most `parts` parts of the nonzeros of SH-rest from here on. The parts with the largest values come first.
-    /// With 0 parts there is no SH-rest, and base colours are those that are seen on average.
+    /// Decodes at most `sh_parts` SH parts from here on. The first has the largest values. With 0 SH parts there is no
+    /// SH-rest, and base colours are the average colours that are seen.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a file that is not packed. Its nonzeros have no parts.
-    pub fn with_sh_parts(mut self, parts: usize) -> Result<Self> {
-        self.decode_options("sh_parts", parts)?.sh_parts = parts;
+    /// [`Error::Parameter`] for a file that is not packed. It has no SH parts.
+    pub fn with_sh_parts(mut self, sh_parts: usize) -> Result<Self> {
+        self.decode_options("sh_parts", sh_parts)?.sh_parts = sh_parts;
         Ok(self)
     }
 
@@ -220,7 +220,7 @@ impl<'a> LexiReader<'a> {
         }
     }
 
-    /// Returns the record of how the file was made and what it promises.
+    /// Returns the record of the making of the file and of its promises.
     #[must_use]
     pub fn record(&self) -> &Record {
         match &self.kind {
@@ -258,17 +258,10 @@ impl<'a> LexiReader<'a> {
     }
 
     /// Returns the number of bytes of each tensor in the file, and of the header under the name `header`, as
-    /// [`LexiWriter::attribute_bytes`](super::LexiWriter::attribute_bytes) does.
+    /// [`LexiWriter::tensor_bytes`](super::LexiWriter::tensor_bytes) does.
     #[must_use]
-    pub fn attribute_bytes(&self) -> &[(String, u64)] {
-        &self.attribute_bytes
-    }
-
-    /// Returns the number of bytes that stand for SH-rest in an exact layout, as
-    /// [`LexiWriter::sh_bytes`](super::LexiWriter::sh_bytes) does.
-    #[must_use]
-    pub fn sh_bytes(&self) -> u64 {
-        super::write::sh_bytes(&self.attribute_bytes)
+    pub fn tensor_bytes(&self) -> &[(String, u64)] {
+        &self.tensor_bytes
     }
 
     /// Returns the places in the source of the Gaussians of `range`, for a packed file that holds the order of its source.
@@ -319,7 +312,7 @@ impl<'a> LexiReader<'a> {
         self.parts(false, take).map(drop)
     }
 
-    /// Does the same as [`Self::each`], with parts of `at_once` Gaussians for exact layouts, for the fuzz targets.
+    /// Does the same as [`Self::each`], with `at_once` Gaussians at a time for exact layouts. It is for the fuzz targets.
     #[cfg(feature = "fuzzing")]
     #[doc(hidden)]
     pub fn each_of(&self, at_once: usize, take: &mut dyn FnMut(usize, Model) -> Result<()>) -> Result<()> {
@@ -387,19 +380,19 @@ impl PackedFile<'_> {
         let budget = MemoryBudget::new(limits, &self.checked.file, self.checked.bytes().len() as u64);
         budget.take(held, GEOMETRY_BYTES + COUNT_BYTES + extra_bytes)?;
         let data = Data::First(super::packed::data(&self.checked)?);
-        let parts = map_chunks(chunks.len(), 1, |c| {
+        let decoded = map_chunks(chunks.len(), 1, |c| {
             self.decoder.chunk(data, chunks.start + c.start, &budget, count_bits)
         });
         // The extras of all chunks are read at once, because a block of a column holds rows of several chunks.
         let own_extras = extras(&self.checked, n, &(first..first + held))?;
         let mut bit_counts = crate::packed::BitCounts::default();
-        for (range, part) in spans.iter().zip(parts) {
-            let (mut geometry, codes, bits) = part?;
+        for (span, chunk) in spans.iter().zip(decoded) {
+            let (mut geometry, codes, bits) = chunk?;
             bit_counts.add(&bits);
-            let rows = range.start - first..range.end - first;
+            let rows = span.start - first..span.end - first;
             geometry.extras = own_extras.iter().map(|extra| extra.slice(rows.clone())).collect();
             let (meta, dictionary) = (self.head.meta.clone(), self.decoder.dictionary().clone());
-            take(range.start, Model::new(geometry, meta, dictionary, codes, self.head.record.clone())?)?;
+            take(span.start, Model::new(geometry, meta, dictionary, codes, self.head.record.clone())?)?;
         }
         Ok(bit_counts)
     }
@@ -420,7 +413,7 @@ impl SplatSource for LexiReader<'_> {
     }
 
     fn row_bytes(&self) -> u64 {
-        let bytes: u64 = self.attribute_bytes.iter().map(|a| a.1).sum();
+        let bytes: u64 = self.tensor_bytes.iter().map(|a| a.1).sum();
         bytes / LexiReader::len(self).max(1) as u64
     }
 
@@ -483,7 +476,7 @@ fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
     }
     let length = checked.bytes().first_chunk::<LENGTH_BYTES>().map_or(0, |l| u64::from_le_bytes(*l));
     let checksum = match checked.has(tensor::HEADER_CHECKSUM) {
-        true => checked.view(tensor::HEADER_CHECKSUM)?.data.len(),
+        true => checked.tensor(tensor::HEADER_CHECKSUM)?.data.len(),
         false => 0,
     };
     out.push(("header".to_owned(), length + (LENGTH_BYTES + checksum) as u64));

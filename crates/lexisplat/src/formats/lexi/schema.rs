@@ -7,7 +7,7 @@ pub const PACKED_VERSION: u64 = 3;
 /// Newest version of the format that can be read.
 pub const MAX_VERSION: u64 = 3;
 
-/// Number of bytes of which the starts of header and data are multiples, as the safetensors format asks.
+/// Divisor of the starts of header and data in bytes, as in the safetensors format.
 pub(super) const HEADER_ALIGNMENT: usize = 8;
 /// Number of bytes of the length that precedes the JSON header.
 pub(super) const LENGTH_BYTES: usize = 8;

@@ -1,4 +1,4 @@
-//! An exact file made part after part: its arrays are spilled until all sizes are known.
+//! An exact file that is made part after part. Its arrays are spilled until all sizes are known.
 
 use super::exact_tensors::{
     ExactTensors, check_pointers, extra_tensor, geometry_tensors, paper_indices, paper_pointers, paper_values,
@@ -24,7 +24,7 @@ pub(crate) struct SpilledModel {
     /// The arrays of [`GEOMETRY`], without the normals if there are none.
     geometry: Vec<Spill>,
     extras: SpilledExtras,
-    /// Counts, or the pointers of layout `paper`.
+    /// The counts, or the pointers of layout `paper`.
     counts: Spill,
     indices: Spill,
     values: Spill,
@@ -33,7 +33,7 @@ pub(crate) struct SpilledModel {
 }
 
 impl SpilledModel {
-    /// An empty one for the Gaussians of `source` and codes with `values`.
+    /// Creates empty arrays for the Gaussians of `source` and codes with `values`.
     pub(crate) fn new(
         to: SpillTo<'_>,
         source: &dyn SplatSource,
@@ -89,7 +89,7 @@ impl SpilledModel {
         self.counts.push(&coded.counts)
     }
 
-    /// All arrays, to be written.
+    /// Returns all arrays, which are then written.
     pub(super) fn finish<'a>(self) -> Result<ExactTensors<'a>> {
         let n = self.gaussians;
         let source = |spill: Spill| spill.finish().map(Source::Spilled);

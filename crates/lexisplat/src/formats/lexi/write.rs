@@ -1,4 +1,4 @@
-//! Writing .lexi files of every layout.
+//! Writing of .lexi files of every layout.
 
 use safetensors::Dtype;
 
@@ -30,7 +30,7 @@ pub fn write<'a>(sink: impl Into<Sink<'a>>, model: &Model) -> Result<u64> {
     LexiWriter::exact(model, CodeLayout::Compact)?.write(sink, &Silent)
 }
 
-/// A .lexi file ready to be written. Its sizes are known.
+/// A .lexi file whose sizes are known, and which is not written yet.
 #[derive(Debug)]
 pub struct LexiWriter<'a> {
     draft: Draft<'a>,
@@ -38,7 +38,7 @@ pub struct LexiWriter<'a> {
 }
 
 impl<'a> LexiWriter<'a> {
-    /// The exact file of `model`.
+    /// Creates the exact file of `model`.
     ///
     /// # Errors
     /// [`crate::Error::Limit`] if the 32-bit pointers of [`CodeLayout::Paper`] cannot count the nonzeros.
@@ -52,7 +52,7 @@ impl<'a> LexiWriter<'a> {
         Ok(Self::new(metadata, tensors))
     }
 
-    /// The file of `packed`.
+    /// Creates the file of `packed`.
     #[must_use]
     pub fn packed(packed: &'a Packed) -> Self {
         let head = packed.head();
@@ -62,7 +62,7 @@ impl<'a> LexiWriter<'a> {
         Self::of_columns(head, packed.data().len(), data, order, extras.collect())
     }
 
-    /// The exact file of a scene that was spilled.
+    /// Creates the exact file of a scene that was spilled.
     #[cfg(feature = "encode")]
     pub(crate) fn spilled(
         spilled: SpilledModel,
@@ -75,7 +75,7 @@ impl<'a> LexiWriter<'a> {
         Ok(Self::new(scene_metadata(layout, dictionary.degree(), record, meta), tensors))
     }
 
-    /// The file of a packed scene that was spilled.
+    /// Creates the file of a packed scene that was spilled.
     ///
     /// # Errors
     /// [`crate::Error::Io`] for temporary files.
@@ -92,7 +92,7 @@ impl<'a> LexiWriter<'a> {
         Ok(Self::of_columns(head, data_bytes, Source::Woven(data), order, extras))
     }
 
-    /// The file of a packed scene. `order` and the values of `extras` are coded columns.
+    /// Creates the file of a packed scene. `order` and the values of `extras` are coded columns.
     fn of_columns(
         head: &'a PackedHead,
         data_bytes: usize,
@@ -104,7 +104,7 @@ impl<'a> LexiWriter<'a> {
         metadata.remove(key::GENERATOR);
         let Record { seed, max_residual, rms_residual, over_tolerance, tolerance, .. } = &head.record;
         metadata.extend([(key::DEGREE, head.degree.to_string())]);
-        // What is missing means nothing, zero or false.
+        // A missing key stands for an empty list, zero or false.
         for (key, residual) in [(key::MAX_RESIDUAL, max_residual), (key::RMS_RESIDUAL, rms_residual)] {
             metadata.extend((*residual != 0.0).then(|| (key, residual.to_string())));
         }
@@ -119,7 +119,7 @@ impl<'a> LexiWriter<'a> {
         metadata.extend(head.target.as_ref().map(|target| (key::TARGET, json(target))));
         metadata.extend(head.reached.as_ref().map(|reached| (key::REACHED, json(reached))));
         metadata.extend(head.device.clone().map(|device| (key::DEVICE, device)));
-        // What draws the scene comes first.
+        // The tensors that draw the scene come first.
         let mut tensors = vec![
             list(tensor::HEAD, Dtype::U8, head.bytes.len(), Source::Bytes(&head.bytes)).sealed(),
             list(tensor::DATA, Dtype::U8, data_bytes, data).summed_elsewhere(),
@@ -138,22 +138,16 @@ impl<'a> LexiWriter<'a> {
         Self { draft, sizes }
     }
 
-    /// Bytes of each tensor, and of the header under `header`. They sum to the size of the file.
+    /// Returns the bytes of each tensor, and of the header under `header`. Their sum is the size of the file.
     #[must_use]
-    pub fn attribute_bytes(&self) -> &[(String, u64)] {
+    pub fn tensor_bytes(&self) -> &[(String, u64)] {
         &self.sizes
     }
 
-    /// Bytes of the whole file.
+    /// Returns the bytes of the whole file.
     #[must_use]
     pub fn file_bytes(&self) -> u64 {
         self.sizes.iter().map(|s| s.1).sum()
-    }
-
-    /// Bytes that stand for SH-rest in an exact file: dictionary, codes and escapes.
-    #[must_use]
-    pub fn sh_bytes(&self) -> u64 {
-        sh_bytes(&self.sizes)
     }
 
     /// Writes the file. Returns the number of bytes.
@@ -166,12 +160,12 @@ impl<'a> LexiWriter<'a> {
     }
 }
 
-/// A tensor of one dimension.
+/// Returns a tensor of one dimension.
 fn list<'a>(name: &str, dtype: Dtype, len: usize, source: Source<'a>) -> Tensor<'a> {
     Tensor::new(name, dtype, &[len], source)
 }
 
-/// Values as a coded column.
+/// Returns values as a coded column.
 fn coded(values: &ExtraValues) -> Vec<u8> {
     let mut encoder = ColumnEncoder::new(values.scalar_type());
     let mut out = encoder.push(values);
@@ -179,16 +173,16 @@ fn coded(values: &ExtraValues) -> Vec<u8> {
     out
 }
 
-/// Values that are coded together while a column is made.
-const COLUMN_PART: usize = 1 << 18;
+/// Number of values that are coded together while a column is made.
+const COLUMN_BLOCK: usize = 1 << 18;
 
-/// The values of all layers, each with their number, as a coded column of type `ty`.
+/// Returns a coded column of type `ty` of the values of all layers. Each layer has its number of values.
 fn coded_layers(ty: ScalarType, layers: Vec<(usize, Spilled)>) -> Result<Vec<u8>> {
     let mut encoder = ColumnEncoder::new(ty);
     let mut out = Vec::new();
     for (mut count, mut layer) in layers {
         while count > 0 {
-            let part = count.min(COLUMN_PART);
+            let part = count.min(COLUMN_BLOCK);
             let values: ExtraValues = with_scalar!(ty, T => layer.take::<T>(part)?.into());
             out.extend(encoder.push(&values));
             count -= part;
@@ -198,20 +192,13 @@ fn coded_layers(ty: ScalarType, layers: Vec<(usize, Spilled)>) -> Result<Vec<u8>
     Ok(out)
 }
 
-/// Bytes of the tensors that stand for SH-rest in an exact file.
-pub(crate) fn sh_bytes(attribute_bytes: &[(String, u64)]) -> u64 {
-    let is_sh =
-        |name: &str| name == tensor::DICTIONARY || name.starts_with("codes.") || name.starts_with("escapes.");
-    attribute_bytes.iter().filter(|a| is_sh(&a.0)).map(|a| a.1).sum()
-}
-
-/// The metadata of an exact file.
+/// Returns the metadata of an exact file.
 fn scene_metadata(layout: Layout, degree: ShDegree, record: &Record, meta: &SceneMeta) -> Metadata {
     let mut metadata = preamble(FORMAT, VERSION);
     metadata.extend([
         (key::DEGREE, degree.to_string()),
         (key::LAYOUT, layout.to_string()),
-        // The key is mandatory. The record of a packed scene has no value for it.
+        // Exact files must have the key, and the record of a packed scene has no value for it.
         (key::PURSUIT, record.pursuit.unwrap_or(Pursuit::Omp).to_string()),
         (key::SEED, record.seed.to_string()),
         (key::MAX_RESIDUAL, record.max_residual.to_string()),

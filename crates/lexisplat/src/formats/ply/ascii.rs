@@ -1,4 +1,4 @@
-//! Rows of an ASCII file, turned into packed little-endian rows a chunk at a time.
+//! Rows of an ASCII file. They become packed little-endian rows, a chunk at a time.
 
 use std::ops::Range;
 
@@ -14,7 +14,7 @@ use crate::support::error::{Error, FormatError, Result};
 pub(super) struct AsciiRows<'a> {
     file: &'a str,
     data: &'a [u8],
-    /// Where each chunk of [`ROWS_PER_TASK`] rows starts in `data`.
+    /// The start of each chunk of [`ROWS_PER_TASK`] rows in `data`.
     starts: Vec<usize>,
     types: Vec<ScalarType>,
     row_bytes: usize,
@@ -32,7 +32,7 @@ impl<'a> AsciiRows<'a> {
     ) -> Result<Self> {
         let vertex = &header.elements[index];
         let types: Vec<ScalarType> = vertex.properties.iter().filter_map(|p| p.kind.scalar()).collect();
-        // Each value takes at least a digit and a separator; the last separator may be missing. Without this check a
+        // Each value takes at least a digit and a separator. The last separator may be missing. Without this check a
         // few short lines could ask for many wide rows.
         let expected = vertex.count.saturating_mul(2 * types.len() as u64).saturating_sub(1);
         let found = data.len() as u64;
@@ -88,7 +88,7 @@ impl<'a> AsciiRows<'a> {
     }
 }
 
-/// The lines from `start` on that are not blank, each with the offset where it starts.
+/// Returns the lines from `start` on that are not blank, each with the offset of its first byte.
 fn lines(data: &[u8], start: usize) -> impl Iterator<Item = (usize, &[u8])> {
     let mut at = start;
     std::iter::from_fn(move || {

@@ -11,25 +11,25 @@ use super::found::Found;
 use super::layout::REST;
 use super::options::ReadOptions;
 use super::summary::PlySummary;
+use crate::scene::dropped::DroppedRows;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::{SceneMeta, Splats};
 use crate::support::error::Result;
 use crate::support::progress::{Progress, Silent, Stage};
 
-/// Rows read together when a file is opened.
+/// Number of rows that are read together when a file is opened.
 const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
 
-/// A PLY whose Gaussians are read a part at a time. It refuses, leaves out and warns of the same as
+/// A PLY whose Gaussians are read a part at a time. Its errors, its omissions and its warnings are those of
 /// [`read_bytes`](super::read_bytes), but no array is as long as the scene.
 #[derive(Debug)]
 pub struct PlySource<'a> {
     file: PlyFile<'a>,
-    /// Rows left out, ascending.
-    dropped: Vec<usize>,
+    dropped: DroppedRows,
     /// Whether any Gaussian has a normal.
     normals: bool,
-    /// The scene, until it is taken, if it was read when the file was opened.
+    /// The scene, if it was read when the file was opened and is not taken yet.
     whole: Mutex<Option<Splats>>,
 }
 
@@ -38,14 +38,14 @@ pub struct PlySource<'a> {
 pub struct PlyRead {
     /// The scene.
     pub splats: Splats,
-    /// Oddities that did not prevent reading, one plain sentence each.
+    /// Warnings about the file, one sentence each.
     pub warnings: Vec<String>,
     /// Description of the file.
     pub summary: PlySummary,
 }
 
 impl<'a> PlySource<'a> {
-    /// Reads the PLY in `bytes` once to find out what is in it; messages call it `name`. Reports
+    /// Reads the PLY in `bytes` once and checks all of its values. Messages call it `name`. Reports
     /// [`Stage::Read`] to `progress`.
     ///
     /// # Errors
@@ -59,8 +59,8 @@ impl<'a> PlySource<'a> {
         Ok(Self::look(name, bytes, options, SCAN_ROWS, progress)?.0)
     }
 
-    /// [`Self::open`] that keeps what it reads, for the first call of [`SplatSource::whole`]. Use it if the whole scene
-    /// will be held anyway. The file is then read once instead of twice.
+    /// Opens as [`Self::open`] does, and keeps the scene for the first call of [`SplatSource::whole`]. The file is then
+    /// read once instead of twice. Use it if the whole scene is held in memory anyway.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -81,7 +81,7 @@ impl<'a> PlySource<'a> {
         Ok(source)
     }
 
-    /// Looks at all values, `at_once` rows at a time. Returns also the last rows looked at, without normals.
+    /// Reads and checks all values, `at_once` rows at a time. Also returns the last rows that were read, without normals.
     fn look(
         name: &'a str,
         bytes: &'a [u8],
@@ -101,25 +101,20 @@ impl<'a> PlySource<'a> {
         file.report(&found, options)?;
         let Found { bad: dropped, normals, places, .. } = found;
         file.settle(places);
+        let dropped = DroppedRows::new(dropped);
         Ok((Self { file, dropped, normals, whole: Mutex::default() }, splats))
     }
 
-    /// Adds the normals to `splats`, which hold rows `rows`, and leaves out those dropped.
+    /// Adds the normals to `splats`, which hold rows `rows`, and leaves the dropped rows out.
     fn finish(&self, rows: Range<usize>, splats: &mut Splats) -> Result<()> {
         if self.normals {
             self.file.fill_normals(rows.clone(), splats)?;
         }
-        let from = |row: usize| self.dropped.partition_point(|&dropped| dropped < row);
-        let dropped = &self.dropped[from(rows.start)..from(rows.end)];
-        if !dropped.is_empty() {
-            let mut keep = vec![true; rows.len()];
-            dropped.iter().for_each(|&row| keep[row - rows.start] = false);
-            splats.retain(&keep);
-        }
+        self.dropped.remove(rows, splats);
         Ok(())
     }
 
-    /// The whole scene and the description of its file.
+    /// Returns the whole scene and the description of its file.
     ///
     /// # Errors
     /// As [`SplatSource::whole`].
@@ -129,50 +124,35 @@ impl<'a> PlySource<'a> {
         Ok(PlyRead { splats, warnings, summary })
     }
 
-    /// SH degree.
+    /// Returns the SH degree.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
         self.file.layout.degree
     }
 
-    /// Comments and marks.
+    /// Returns the comments and the marks.
     #[must_use]
     pub fn meta(&self) -> &SceneMeta {
         &self.file.meta
     }
 
-    /// Oddities that did not prevent reading, one plain sentence each.
+    /// Returns the warnings about the file, one sentence each.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.file.warnings
     }
 
-    /// What the file was like.
+    /// Returns the description of the file.
     #[must_use]
     pub fn summary(&self) -> &PlySummary {
         &self.file.summary
     }
-
-    /// The row of Gaussian `gaussian`.
-    fn row(&self, gaussian: usize) -> usize {
-        // `dropped[j] - j` Gaussians come before the dropped row number j.
-        let (mut low, mut high) = (0, self.dropped.len());
-        while low < high {
-            let middle = low.midpoint(high);
-            if self.dropped[middle] - middle <= gaussian {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        gaussian + low
-    }
 }
 
 impl SplatSource for PlySource<'_> {
-    /// Number of Gaussians, without those left out.
+    /// Returns the number of Gaussians, without those left out.
     fn len(&self) -> usize {
-        self.file.count - self.dropped.len()
+        self.file.count - self.dropped.count()
     }
 
     fn empty(&self) -> Splats {
@@ -196,11 +176,7 @@ impl SplatSource for PlySource<'_> {
     }
 
     fn read(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
-        check_range(&range, self.len())?;
-        let rows = match range.end.checked_sub(1) {
-            Some(last) if last >= range.start => self.row(range.start)..self.row(last) + 1,
-            _ => 0..0,
-        };
+        let rows = self.dropped.rows(&range, self.file.count)?;
         self.file.check_memory(rows.len(), self.normals)?;
         self.file.fill(rows.clone(), splats, &Silent)?;
         self.finish(rows, splats)
@@ -224,9 +200,9 @@ impl SplatSource for PlySource<'_> {
         if let Some(&last) = gaussians.iter().max() {
             check_range(&(last..last.saturating_add(1)), self.len())?;
         }
-        // Neighbours in the file are read together: a line of text is found from the last known one on.
+        // Neighbours in the file are read together, because a line of text is searched for from the last known line on.
         let mut order: Vec<(usize, usize)> =
-            gaussians.iter().enumerate().map(|(k, &gaussian)| (self.row(gaussian), k)).collect();
+            gaussians.iter().enumerate().map(|(k, &gaussian)| (self.dropped.row(gaussian), k)).collect();
         order.sort_unstable();
         let row_bytes = self.file.layout.row_bytes;
         for group in order.chunk_by(|a, b| a.0 / ROWS_PER_TASK == b.0 / ROWS_PER_TASK) {
@@ -247,7 +223,7 @@ mod tests {
     use super::*;
     use crate::formats::ply::{read_bytes, write};
 
-    /// The first `whole` gives what was read when the file was opened, the second reads the file.
+    /// The first `whole` returns the scene that was read when the file was opened. The second reads the file.
     #[test]
     fn a_file_opened_whole_gives_the_same_as_one_read_in_parts() {
         let count = 2 * ROWS_PER_TASK + 7;

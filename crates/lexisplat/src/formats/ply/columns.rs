@@ -3,8 +3,8 @@
 use super::scalar::Scalar;
 use crate::scene::extra::{ScalarType, with_scalar};
 
-/// Rows that one task copies, one run of columns after another. At 248 bytes a row they stay in a core's second-level
-/// cache meanwhile.
+/// Number of rows that one task copies, one run of columns after another. At 248 bytes a row they fit in the second-level
+/// cache of a core.
 pub(super) const ROWS_PER_TASK: usize = 1024;
 
 /// Packed rows of one size and byte order.
@@ -18,24 +18,24 @@ pub(super) struct Packed<'a> {
     pub(super) big: bool,
 }
 
-/// Where a property lies in a row.
+/// The place of a property in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Field {
-    /// First byte.
+    /// Its first byte.
     pub(super) offset: usize,
-    /// Type there.
+    /// Its type in the file.
     pub(super) ty: ScalarType,
 }
 
-/// Properties that become one array of f32 with `width` values a Gaussian.
+/// Properties that become one array of f32 with `width` values for each Gaussian.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Group {
-    /// Values a Gaussian.
+    /// Number of values of a Gaussian.
     pub(super) width: usize,
     runs: Vec<Run>,
 }
 
-/// Fields of one type that are consecutive both in the file's row and in the array's.
+/// Fields of one type that are consecutive in the row of the file and in the row of the array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Run {
     first: Field,
@@ -45,7 +45,7 @@ struct Run {
 }
 
 impl Group {
-    /// The group whose column `i` is `fields[i]`.
+    /// Creates the group whose column `i` is `fields[i]`.
     pub(super) fn new(fields: &[Field]) -> Self {
         let mut runs: Vec<Run> = Vec::new();
         for (slot, &field) in fields.iter().enumerate() {
@@ -62,14 +62,14 @@ impl Group {
         Self { width: fields.len(), runs }
     }
 
-    /// Whether any property is of a type whose values f32 may not hold.
+    /// Returns whether any property has a type whose values f32 may not hold.
     pub(super) fn is_finer_than_f32(&self) -> bool {
         self.runs
             .iter()
             .any(|run| matches!(run.first.ty, ScalarType::F64 | ScalarType::I32 | ScalarType::U32))
     }
 
-    /// Fills `out`, `width` values a row of `rows`, without rounding.
+    /// Fills `out` with `width` values for each row of `rows`, without rounding.
     pub(super) fn read_exact(&self, rows: Packed<'_>, out: &mut [f64]) {
         for run in &self.runs {
             for k in 0..run.len {
@@ -85,7 +85,7 @@ impl Group {
         }
     }
 
-    /// Fills `out`, `width` values a row of `rows`.
+    /// Fills `out` with `width` values for each row of `rows`.
     pub(super) fn read(&self, rows: Packed<'_>, out: &mut [f32]) {
         for &run in &self.runs {
             let read = with_scalar!(run.first.ty, T => if rows.big { read_run::<T, true> } else { read_run::<T, false> });
@@ -95,7 +95,7 @@ impl Group {
 }
 
 fn read_run<T: Scalar, const BIG: bool>(rows: Packed<'_>, run: Run, out: &mut [f32], width: usize) {
-    // The lengths that every layout has are constants here, so that the compiler unrolls their loops.
+    // The usual lengths are constants here, so that the compiler unrolls their loops.
     match run.len {
         1 => copy_run::<T, BIG>(rows, Run { len: 1, ..run }, out, width),
         3 => copy_run::<T, BIG>(rows, Run { len: 3, ..run }, out, width),
@@ -128,9 +128,9 @@ pub(super) fn read_column<T: Scalar>(rows: Packed<'_>, offset: usize, out: &mut 
     }
 }
 
-/// Whether any value is NaN or infinite.
+/// Returns whether any value is NaN or infinite.
 pub(super) fn any_not_finite(values: &[f32]) -> bool {
-    // There is no early exit, so that the loop is vectorised. The answer is nearly always no.
+    // An early exit would prevent vector code, and nearly all files have no such value.
     values.iter().fold(false, |any, v| any | !v.is_finite())
 }
 

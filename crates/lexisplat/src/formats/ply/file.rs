@@ -1,4 +1,4 @@
-//! A PLY whose header was read and whose values were not.
+//! A PLY whose header is read and whose values are not read yet.
 
 use super::found::Found;
 use super::header::Header;
@@ -27,13 +27,13 @@ pub(super) struct PlyFile<'a> {
     pub(super) meta: SceneMeta,
     pub(super) warnings: Vec<String>,
     pub(super) summary: PlySummary,
-    /// Whether positions are finer than f32 and no offset was decided on yet.
+    /// Whether positions are finer than f32 and the offset is not decided yet.
     pub(super) looks_at_positions: bool,
     limits: Limits,
 }
 
 impl<'a> PlyFile<'a> {
-    /// Reads the header of `bytes`, which messages call `name`.
+    /// Reads the header of `bytes`. Messages call the file `name`.
     pub(super) fn open(name: &'a str, bytes: &'a [u8], options: &ReadOptions) -> Result<Self> {
         let file_bytes = bytes.len() as u64;
         let bytes = without_byte_order_mark(bytes);
@@ -61,7 +61,7 @@ impl<'a> PlyFile<'a> {
         Ok(Self { name, rows, layout, count, meta, warnings, summary, looks_at_positions, limits })
     }
 
-    /// Refuses to hold `rows` rows, with normals or without, if the limits do not allow it.
+    /// Returns an error if the limits do not allow `rows` rows in memory, with normals or without.
     pub(super) fn check_memory(&self, rows: usize, normals: bool) -> Result<()> {
         let extras = self.layout.extras.iter().map(|(_, field)| field.ty.bytes()).sum::<usize>();
         let floats = self.layout.degree.rest() + if normals { NORMAL.len() } else { 0 };
@@ -69,7 +69,7 @@ impl<'a> PlyFile<'a> {
         budget.take(rows, GEOMETRY_BYTES + floats * size_of::<f32>() + extras)
     }
 
-    /// Decides on an offset, once all rows were looked at.
+    /// Decides on an offset, after all rows were read.
     pub(super) fn settle(&mut self, places: Places) {
         if std::mem::take(&mut self.looks_at_positions) {
             let settled = places.settle();
@@ -78,8 +78,8 @@ impl<'a> PlyFile<'a> {
         }
     }
 
-    /// Refuses the file if bad rows were `found`, or adds a warning that they are dropped. Adds a warning about
-    /// infinite opacities, and one about flat Gaussians.
+    /// Returns an error if bad rows were `found`, or adds a warning that they are dropped. Also adds warnings about
+    /// infinite opacities and about flat Gaussians.
     pub(super) fn report(&mut self, found: &Found, options: &ReadOptions) -> Result<()> {
         if found.sure > 0 {
             self.warnings.push(format!(

@@ -1,4 +1,4 @@
-//! Fills arrays from rows, in parallel, and finds values that are not finite.
+//! Filling of arrays from rows, in parallel. It finds values that are not finite.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
 
-/// A scene of this layout without Gaussians.
+/// Returns a scene of this layout without Gaussians.
 pub(super) fn empty(layout: &Layout) -> Splats {
     let extras = layout.extras.iter().map(|(name, field)| Extra {
         name: name.clone(),
@@ -28,10 +28,10 @@ pub(super) fn empty(layout: &Layout) -> Splats {
 
 /// Resizes all arrays but the normals to `count` Gaussians. Their contents have no meaning afterwards.
 ///
-/// The caller has checked that the file holds `count` rows, and every property takes at least a byte of a row. The
-/// arrays therefore take at most four times the bytes of the file.
+/// The caller has checked that the file holds `count` rows. Every property takes at least a byte of a row, so the arrays
+/// take at most four times the bytes of the file.
 fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Result<()> {
-    /// New memory comes zeroed from the system. The threads that fill it are the first to touch it.
+    /// New memory is zeroed by the system. The threads that fill it are the first to touch it.
     fn sized<T: Copy>(values: &mut Vec<T>, len: usize, zero: T) {
         if values.is_empty() {
             *values = vec![zero; len];
@@ -40,7 +40,7 @@ fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Res
         }
     }
     let rest = layout.degree.rest();
-    // 14 floats, 3 for normals, and at most 8 bytes for an extra. Only 32-bit systems can fail here.
+    // A Gaussian has 14 floats, 3 more for normals, and at most 8 bytes for an extra. Only 32-bit systems can fail here.
     let row = (17 + rest) * size_of::<f32>() + layout.extras.len() * size_of::<f64>();
     if count.checked_mul(row).is_none_or(|bytes| isize::try_from(bytes).is_err()) {
         return Err(Error::malformed(file, format!("{count} vertices do not fit in memory")));
@@ -59,20 +59,20 @@ fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Res
     Ok(())
 }
 
-/// Fills one extra for one chunk of rows.
+/// A function that fills one extra for one chunk of rows.
 type ExtraFill<'a> = Box<dyn FnMut(Packed<'_>) + Send + 'a>;
 
-/// One chunk of rows and the parts of the arrays that it fills.
+/// One chunk of rows, and the slices of the arrays that it fills.
 struct Piece<'a> {
     rows: Range<usize>,
-    /// Parts of the arrays of floats, in the order of [`Layout::groups`]. That of the normals is empty.
+    /// Slices of the arrays of floats, in the order of [`Layout::groups`]. The slice of the normals is empty.
     floats: [&'a mut [f32]; GROUPS],
     extras: Vec<ExtraFill<'a>>,
 }
 
 impl PlyFile<'_> {
-    /// Fills all arrays of `splats` but the normals with rows `range`. `splats` came from [`empty`] and may have been
-    /// filled before. Advances `progress` by the bytes of the rows.
+    /// Fills all arrays of `splats` but the normals with rows `range`. `splats` must come from [`empty`] and may have
+    /// been filled before. Advances `progress` by the bytes of the rows.
     pub(super) fn fill(
         &self,
         range: Range<usize>,
@@ -81,49 +81,49 @@ impl PlyFile<'_> {
     ) -> Result<Found> {
         resize(self.name, &self.layout, range.len(), splats)?;
         let mut found = Found::default();
-        let parts = map_vec(pieces(splats, &self.layout, range.start), |piece| {
+        let tasks = map_vec(pieces(splats, &self.layout, range.start), |piece| {
             progress.check()?;
             progress.advance(piece.rows.len() as u64 * self.layout.row_bytes as u64);
             self.fill_piece(piece)
         });
-        for part in parts {
-            found.add(part?);
+        for task in tasks {
+            found.add(task?);
         }
         Ok(found)
     }
 
-    /// Fills the normals. Few files have any, so they get a second pass, and scenes without normals need no array.
+    /// Fills the normals. Few files have any, so they are read in a second pass, and most scenes need no array for them.
     pub(super) fn fill_normals(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
         let width = self.layout.groups[NORMALS].width;
         if width == 0 {
             return Ok(());
         }
         splats.geometry.normals = vec![[0.0; 3]; range.len()];
-        let parts = splats.geometry.normals.chunks_mut(ROWS_PER_TASK).enumerate().collect();
-        let done = map_vec(parts, |(c, part): (usize, &mut [[f32; 3]])| {
+        let slices = splats.geometry.normals.chunks_mut(ROWS_PER_TASK).enumerate().collect();
+        let done = map_vec(slices, |(c, slice): (usize, &mut [[f32; 3]])| {
             let start = range.start + c * ROWS_PER_TASK;
-            let (bytes, big) = self.rows.packed(start..start + part.len())?;
+            let (bytes, big) = self.rows.packed(start..start + slice.len())?;
             let packed = Packed { bytes: &bytes, row_bytes: self.layout.row_bytes, big };
-            self.layout.groups[NORMALS].read(packed, part.as_flattened_mut());
+            self.layout.groups[NORMALS].read(packed, slice.as_flattened_mut());
             Ok(())
         });
         done.into_iter().collect()
     }
 
-    /// Fills the positions anew, once there is an offset.
+    /// Fills the positions again, after the offset was decided.
     pub(super) fn fill_positions(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
-        let parts = splats.geometry.positions.chunks_mut(ROWS_PER_TASK).enumerate().collect();
-        let done = map_vec(parts, |(c, part): (usize, &mut [[f32; 3]])| {
+        let slices = splats.geometry.positions.chunks_mut(ROWS_PER_TASK).enumerate().collect();
+        let done = map_vec(slices, |(c, slice): (usize, &mut [[f32; 3]])| {
             let start = range.start + c * ROWS_PER_TASK;
-            let (bytes, big) = self.rows.packed(start..start + part.len())?;
+            let (bytes, big) = self.rows.packed(start..start + slice.len())?;
             let packed = Packed { bytes: &bytes, row_bytes: self.layout.row_bytes, big };
-            self.positions(packed, part.as_flattened_mut());
+            self.positions(packed, slice.as_flattened_mut());
             Ok(())
         });
         done.into_iter().collect()
     }
 
-    /// Fills `out` with positions less the offset.
+    /// Fills `out` with positions minus the offset.
     fn positions(&self, rows: Packed<'_>, out: &mut [f32]) {
         let group = &self.layout.groups[POSITIONS];
         let Some(offset) = self.meta.offset else { return group.read(rows, out) };
@@ -200,15 +200,16 @@ fn pieces<'a>(splats: &'a mut Splats, layout: &'a Layout, first: usize) -> Vec<P
     for (extra, (_, field)) in geometry.extras.iter_mut().zip(&layout.extras) {
         let offset = field.offset;
         for_extra!(&mut extra.values, values => {
-            for (piece, part) in pieces.iter_mut().zip(values.chunks_mut(ROWS_PER_TASK)) {
-                piece.extras.push(Box::new(move |rows| read_column(rows, offset, part)));
+            for (piece, slice) in pieces.iter_mut().zip(values.chunks_mut(ROWS_PER_TASK)) {
+                piece.extras.push(Box::new(move |rows| read_column(rows, offset, slice)));
             }
         });
     }
     pieces
 }
 
-/// The Gaussians with NaN or infinite values among `rows`, whose values are `floats`, and the first such property.
+/// Returns the rows among `rows` with NaN or infinite values, and the first such property. `floats` has the values of all
+/// rows.
 fn bad_rows(rows: &Range<usize>, floats: [&[f32]; GROUPS]) -> (Vec<usize>, Option<String>) {
     let count = rows.len();
     let rest_names: Vec<String> = (0..floats[REST].len() / count).map(rest_name).collect();

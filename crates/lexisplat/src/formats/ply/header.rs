@@ -8,17 +8,17 @@ use crate::scene::extra::ScalarType;
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 
-/// Most elements one header may declare. Real files have one to three.
+/// Largest number of elements of a header. Real files have one to three.
 const MAX_ELEMENTS: u64 = 1024;
 
 /// Names of floats of 16 bits, which some programs write although no PLY has them.
 const HALF: [&str; 4] = ["half", "float16", "f2", "halffloat"];
 
-/// How values are stored after the header.
+/// The encoding of the values after the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Format {
-    /// Decimal text, one row a line.
+    /// Decimal text, one row for each line.
     Ascii,
     /// Packed rows, least significant byte first.
     BinaryLittleEndian,
@@ -41,7 +41,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The type of a single value.
+    /// Returns the type of a single value.
     #[must_use]
     pub fn scalar(self) -> Option<ScalarType> {
         match self {
@@ -72,7 +72,7 @@ pub struct Element {
 }
 
 impl Element {
-    /// Bytes of one binary row; `None` if a list makes rows differ.
+    /// Returns the bytes of one binary row; `None` if rows differ in length because of a list.
     #[must_use]
     pub fn row_bytes(&self) -> Option<usize> {
         self.properties.iter().map(|p| p.kind.scalar().map(ScalarType::bytes)).sum()
@@ -83,21 +83,21 @@ impl Element {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Header {
-    /// How values are stored.
+    /// The encoding of the values.
     pub format: Format,
     /// Comment texts in order, without the keyword and outer spaces.
     pub comments: Vec<String>,
     /// The elements in file order.
     pub elements: Vec<Element>,
-    /// Bytes of the header; the data start here.
+    /// Number of bytes of the header. The data start after it.
     pub bytes: usize,
 }
 
 impl Header {
-    /// Parses the header at the start of `bytes`, which came from the file called `file`. For readers of further formats.
+    /// Parses the header at the start of `bytes`, the bytes of the file called `file`. It is for readers of further formats.
     ///
     /// # Errors
-    /// [`Error::Format`] for bytes that are no PLY header, [`Error::Limit`] for one that asks for too much.
+    /// [`Error::Format`] for bytes that are no PLY header, [`Error::Limit`] for a header that is over the limits.
     pub fn parse(file: &str, bytes: &[u8], limits: &Limits) -> Result<Self> {
         FileKind::Ply.expect(file, bytes)?;
         let mut lines = Lines::new(file, bytes, *limits);
@@ -150,7 +150,7 @@ impl Header {
     }
 }
 
-/// What a line says, or what is wrong with it.
+/// The content of a line, or its fault.
 type Parsed<T> = Result<T, &'static str>;
 
 fn parse_format<'a>(mut words: impl Iterator<Item = &'a str>) -> Parsed<Format> {
@@ -196,21 +196,21 @@ fn parse_property<'a>(mut words: impl Iterator<Item = &'a str>) -> Parsed<Proper
         word => Kind::Scalar(ty(word)?),
     };
     match (words.next(), words.next()) {
-        // A PLY writer could not write such a name back.
+        // A PLY cannot hold such a name, so no writer could write it back.
         (Some(name), None) if name.chars().any(char::is_control) => Err("control characters in the name"),
         (Some(name), None) => Ok(Property { name: name.to_owned(), kind }),
         _ => Err("expected one name after the type"),
     }
 }
 
-/// Header lines, which end in `\n` or `\r\n`. If the first line ends in `\r` alone, all lines do.
+/// The lines of a header, which end in `\n` or `\r\n`. If the first line ends in `\r` alone, all lines do.
 struct Lines<'a> {
     file: &'a str,
     bytes: &'a [u8],
     limits: Limits,
     /// Start of the next line.
     at: usize,
-    /// Lines returned so far.
+    /// Number of lines that were returned.
     number: usize,
     end: u8,
 }
@@ -224,7 +224,7 @@ impl<'a> Lines<'a> {
         Self { file, bytes, limits, at: 0, number: 0, end: if mac { b'\r' } else { b'\n' } }
     }
 
-    /// The next line without its end, or `None` at the end of the bytes.
+    /// Returns the next line without its end, or `None` at the end of the bytes.
     fn next(&mut self) -> Result<Option<&'a [u8]>> {
         let rest = &self.bytes[self.at..];
         let budget =

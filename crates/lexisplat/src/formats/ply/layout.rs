@@ -1,4 +1,4 @@
-//! Where each property lies in a row, and the refusal of PLY files that are no 3DGS scenes.
+//! The place of each property in a row, and the refusal of PLY files that are no 3DGS scenes.
 
 use std::collections::HashMap;
 
@@ -12,30 +12,30 @@ use crate::support::error::{FormatError, Result};
 
 /// Number of arrays of floats: positions, normals, base colours, SH-rest, opacities, scales, rotations.
 pub(super) const GROUPS: usize = 7;
-/// Where the positions, normals, SH-rest, opacities and scales are among them.
+/// Indices of the positions, normals, SH-rest, opacities and scales among these arrays.
 pub(super) const POSITIONS: usize = 0;
 pub(super) const NORMALS: usize = 1;
 pub(super) const REST: usize = 3;
 pub(super) const OPACITIES: usize = 4;
 pub(super) const SCALES: usize = 5;
 
-/// What a header says, or why the file is refused.
+/// A fact of a header, or the reason of a refusal.
 type Accepted<T> = Result<T, FormatError>;
 
-/// Where each property lies in a vertex row.
+/// The place of each property in a vertex row.
 #[derive(Debug)]
 pub(super) struct Layout {
     /// The index of the vertex element in the header.
     pub(super) vertex: usize,
     pub(super) row_bytes: usize,
     pub(super) degree: ShDegree,
-    /// The properties of each array of floats, in INRIA's order. Those of the normals are empty unless all three exist.
+    /// The properties of each array of floats, in INRIA's order. The list of the normals is empty unless all three exist.
     pub(super) groups: [Group; GROUPS],
     /// Properties that 3DGS does not define, in file order.
     pub(super) extras: Vec<(String, Field)>,
-    /// Whether the Gaussians are 2D ones: there is no third scale, and its column is to be filled.
+    /// Whether the Gaussians are 2D ones. A file of these has no third scale, and the reader fills its column.
     pub(super) is_flat: bool,
-    /// Oddities of the properties, one plain sentence each.
+    /// Warnings about the properties, one sentence each.
     pub(super) warnings: Vec<String>,
 }
 
@@ -75,7 +75,7 @@ impl Layout {
             warnings.push(format!("converted to 32-bit float: {}", listed(&columns.converted)));
         }
         let row_bytes = columns.row_bytes;
-        // The properties that are left, in file order.
+        // The remaining properties, in file order.
         let mut extras: Vec<_> = columns.fields.into_iter().map(|(n, f)| (n.to_owned(), f)).collect();
         extras.sort_by_key(|(_, field)| field.offset);
         if !extras.is_empty() {
@@ -112,7 +112,7 @@ fn vertex_index(header: &Header) -> Accepted<usize> {
     }
 }
 
-/// Refuses relatives of 3DGS, recognised by the properties they have or lack.
+/// Refuses files of related methods, recognised by the properties that they have or lack.
 fn refuse_other_kinds(columns: &Columns<'_>) -> Accepted<()> {
     let has = |name: &str| columns.fields.contains_key(name);
     let shaped = has(SCALE[0]) && has(ROTATION[0]);
@@ -131,7 +131,7 @@ fn rest_names(columns: &Columns<'_>) -> Accepted<(ShDegree, Vec<String>)> {
     let number = |name: &str| -> Option<usize> {
         let digits = name.strip_prefix(REST_PREFIX).filter(|digits| !digits.is_empty())?;
         let are_digits = digits.bytes().all(|digit| digit.is_ascii_digit());
-        // A number with too many digits is beyond all that can be there.
+        // A number with too many digits is above all numbers that a file can have.
         are_digits.then(|| digits.parse().unwrap_or(usize::MAX))
     };
     let mut numbers: Vec<usize> = columns.fields.keys().filter_map(|name| number(name)).collect();

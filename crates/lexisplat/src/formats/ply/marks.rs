@@ -1,6 +1,6 @@
 //! The anti-aliasing mark that trainers write into a comment.
 //!
-//! Brush writes `SplatRenderMode: mip` or `SplatRenderMode: default`, Postshot `antialiased 1` or
+//! Brush writes `SplatRenderMode: mip` or `SplatRenderMode: default`. Postshot writes `antialiased 1` or
 //! `antialiased 0`. The mark decides how a scene is drawn, so it must survive every conversion.
 
 use crate::scene::splats::SceneMeta;
@@ -8,7 +8,7 @@ use crate::scene::splats::SceneMeta;
 /// Postshot's mark. The writer adds it if no comment has a mark.
 pub(super) const ANTIALIASED: &str = "antialiased 1";
 
-/// Whether a comment says that the scene is anti-aliased; `None` if it says nothing about it.
+/// Returns whether the scene is anti-aliased according to a comment; `None` if the comment has no mark.
 pub(super) fn mark(comment: &str) -> Option<bool> {
     let lower = comment.to_ascii_lowercase();
     let mut words =
@@ -20,11 +20,11 @@ pub(super) fn mark(comment: &str) -> Option<bool> {
     }
 }
 
-/// What all comments together say about anti-aliasing.
+/// The marks of all comments together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Marks {
-    /// Whether at least one comment says yes. A scene with both answers counts as anti-aliased: the yes needs a trainer
-    /// that supports it, the no is a default.
+    /// Whether at least one comment says yes. A scene with both answers counts as anti-aliased, because a trainer writes
+    /// yes only if it supports anti-aliasing, and writes no by default.
     pub(super) antialiased: bool,
     /// Whether one comment says yes and another says no.
     pub(super) contradict: bool,
@@ -40,7 +40,7 @@ pub(super) fn marks<S: AsRef<str>>(comments: &[S]) -> Marks {
     Marks { antialiased: yes, contradict: yes && no }
 }
 
-/// What `comments` say of a scene, of which they are a part. For readers of further formats.
+/// Returns the metadata of a scene with these `comments`. It is for readers of further formats.
 #[must_use]
 pub fn meta_of(comments: Vec<String>) -> SceneMeta {
     let antialiased = marks(&comments).antialiased;

@@ -1,17 +1,18 @@
-//! PLY scenes: reads every trainer's dialect, writes INRIA's layout.
+//! PLY scenes: a reader of the dialects of all trainers, and a writer of INRIA's layout.
 //!
 //! The reader finds properties by name, in any order and of any scalar type, in binary files of either byte order
 //! and in ASCII files. It keeps properties beyond 3DGS as [`Extra`](crate::Extra). It refuses files that this crate
-//! cannot code (compressed and anchor models, point clouds) and says what they are. 2D Gaussians are read as flat ones.
+//! cannot code (compressed and anchor models, point clouds) with an error that names their kind. 2D Gaussians become flat
+//! ones.
 //!
-//! Positions of other types than f32 are not rounded where that would move Gaussians by more than a hundredth of their
-//! size: an [`Offset`](crate::Offset) is subtracted from them first, and the writer puts it back.
+//! Rounding to f32 could move Gaussians by more than a hundredth of their size if positions have another type. An
+//! [`Offset`](crate::Offset) is then subtracted first, and the writer adds it again.
 //!
-//! It is tested on the layouts of INRIA (also 3DGS-MCMC and Pixel-GS), gsplat, nerfstudio, Brush and Postshot.
+//! The reader is tested on the layouts of INRIA (also 3DGS-MCMC and Pixel-GS), gsplat, nerfstudio, Brush and Postshot.
 //!
 //! A binary file is mapped, and the arrays are filled in parallel. Each task copies a chunk of rows, one run of
-//! neighbouring properties after another; type and byte order are looked up once a run, never once a value. Rows of
-//! an ASCII file become binary rows first.
+//! neighbouring properties after another. Type and byte order are looked up once for each run. Rows of an ASCII file become
+//! binary rows first.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

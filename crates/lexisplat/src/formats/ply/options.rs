@@ -1,9 +1,9 @@
-//! How a PLY is read.
+//! Options of reading a PLY.
 
 use crate::support::builder::builder_methods;
 use crate::support::limits::Limits;
 
-/// How to read a PLY.
+/// Options of reading a PLY.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct ReadOptions {
@@ -11,7 +11,7 @@ pub struct ReadOptions {
     pub drop_invalid: bool,
     /// Whether to leave out the properties that 3DGS does not define. Default `false`.
     pub drop_extras: bool,
-    /// How much a file may ask for.
+    /// The limits on a file.
     pub limits: Limits,
 }
 

@@ -5,32 +5,32 @@ use std::ops::Range;
 use crate::scene::offset::Offset;
 use crate::scene::rounding::Rounding;
 
-/// Half the distance of neighbouring values in single precision is at most this share of them.
+/// Half the distance of neighbouring values in single precision is at most this share of the values.
 const HALF_STEP: f64 = 1.0 / (1_u64 << 24) as f64;
-/// What is left of the rounding with an offset, as a share, if the offset is worth it.
+/// Largest remaining rounding with an offset, as a share of the rounding without it. Otherwise the offset is not worth it.
 const WORTH: f64 = 0.5;
 
-/// What positions in double precision are like.
+/// Facts about positions in double precision.
 #[derive(Debug, Default)]
 pub(super) struct Places {
-    /// By how much rounding moves one at most, along an axis.
+    /// The largest move of a position by rounding, along an axis.
     error: f64,
-    /// The least and the largest numbers along each axis.
+    /// The least and the largest coordinate along each axis.
     bounds: Option<[[f64; 3]; 2]>,
-    /// Some positions, and the sizes of their Gaussians, in the order of rows.
+    /// A sample of positions with the sizes of their Gaussians, in the order of rows.
     sample: Vec<([f64; 3], f64)>,
 }
 
-/// What becomes of positions.
+/// The decision on an offset.
 #[derive(Debug, PartialEq)]
 pub(super) struct Settled {
     pub(super) offset: Option<Offset>,
-    /// What there is to say about it.
+    /// A warning about the rounding.
     pub(super) warnings: Vec<String>,
 }
 
 impl Places {
-    /// Those of `rows`, without the ones in `bad`, which is sorted. One of `stride` rows is in the sample.
+    /// Returns the facts about `rows` without the rows `bad`, which are sorted. One of `stride` rows is in the sample.
     pub(super) fn of(
         rows: Range<usize>,
         stride: usize,
@@ -61,7 +61,7 @@ impl Places {
         }
     }
 
-    /// Adds those of the next rows.
+    /// Adds the facts about the next rows.
     pub(super) fn add(&mut self, next: Self) {
         self.error = self.error.max(next.error);
         self.sample.extend(next.sample);
@@ -72,7 +72,7 @@ impl Places {
         }
     }
 
-    /// Decides on an offset. There is one only if rounding without it would be coarse.
+    /// Decides on an offset. The result has one only if rounding without it would be coarse.
     pub(super) fn settle(self) -> Settled {
         let size = Rounding::median(self.sample.iter().map(|place| place.1).collect());
         let plain = Rounding { error: self.error, size };
@@ -87,7 +87,7 @@ impl Places {
         Settled { offset: Some(offset), warnings }
     }
 
-    /// A limit of the rounding of positions relative to `offset`; infinite if they leave single precision.
+    /// Returns a bound of the rounding of positions relative to `offset`; infinite if they leave single precision.
     fn error_with(&self, offset: Offset) -> f64 {
         let farthest = self.bounds.iter().flatten().fold(0.0_f64, |most, corner| {
             corner.iter().zip(offset.get()).fold(most, |most, (v, o)| most.max((v - o).abs()))
@@ -95,8 +95,9 @@ impl Places {
         if farthest < f64::from(f32::MAX) { farthest * HALF_STEP } else { f64::INFINITY }
     }
 
-    /// The median of the sample along each axis, rounded to a multiple of a power of two near half the extent of most of it:
-    /// few digits, and subtracting it from a position is exact. A few Gaussians far away do not change it much.
+    /// Returns the median of the sample along each axis, rounded to a multiple of a power of two near half the extent of
+    /// most of the sample. It has few digits, and subtracting it from a position is exact. A few Gaussians far away
+    /// hardly change it.
     fn offset(&self) -> Option<Offset> {
         let along = [0, 1, 2].map(|axis| {
             let mut along: Vec<f64> = self.sample.iter().map(|place| place.0[axis]).collect();
@@ -145,7 +146,7 @@ mod tests {
         assert_eq!(found.warnings[0], said);
     }
 
-    /// Where nothing can be done, it is said.
+    /// If no offset helps, there is a warning.
     #[test]
     fn a_rounding_that_is_left_is_told() {
         let mut wide = places([0.0; 3], 500, 1e-9);
@@ -170,8 +171,8 @@ mod tests {
             let values = 3 * range.start..3 * range.end;
             Places::of(range, 1, &[], &flat[values.clone()], &scales[values])
         };
-        let mut parts = Places::default();
-        [0..1, 1..70, 70..150].map(piece).into_iter().for_each(|part| parts.add(part));
-        assert_eq!(parts.settle(), piece(0..150).settle());
+        let mut sum = Places::default();
+        [0..1, 1..70, 70..150].map(piece).into_iter().for_each(|one| sum.add(one));
+        assert_eq!(sum.settle(), piece(0..150).settle());
     }
 }

@@ -20,17 +20,15 @@ pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<PlyRead> {
 
 /// Reads the PLY in `bytes`. Errors call it `name`.
 ///
-/// Floats keep their bits. Other types become the nearest f32, with a warning; positions that this would move coarsely get
-/// an offset ([`SceneMeta::offset`](crate::SceneMeta::offset)). Infinite opacities become 100 and
-/// -100, and scales of minus infinity [`FLAT_SCALE`](crate::FLAT_SCALE), which look the same, with a warning. A file of
-/// 2D Gaussians, which has no third scale, is read as one of flat ones. Memory: the arrays of the result, at most a few
-/// times `bytes`.
+/// Floats keep their bits. Values of other types become the nearest f32, with a warning. Positions that rounding would move
+/// coarsely get an offset ([`SceneMeta::offset`](crate::SceneMeta::offset)). Infinite opacities become 100 and -100, and
+/// scales of minus infinity become [`FLAT_SCALE`](crate::FLAT_SCALE). Both look the same, and there is a warning. 2D
+/// Gaussians, which have no third scale, become flat ones. The result takes at most a few times the memory of `bytes`.
 ///
 /// # Errors
-/// [`crate::Error::Format`] that says what is wrong: the bytes are no PLY, or an unsupported relative of 3DGS; a
-/// property is missing or repeated; a count does not match; or other values are NaN or infinite and
-/// [`ReadOptions::drop_invalid`] is not set. [`crate::Error::Limit`] if the file asks for more than
-/// [`ReadOptions::limits`] allow.
+/// [`crate::Error::Format`] if the bytes are no PLY, or a PLY of an unsupported method; if a property is missing or
+/// repeated; if a count does not match; or if other values are NaN or infinite and [`ReadOptions::drop_invalid`] is not set.
+/// [`crate::Error::Limit`] if the file is over [`ReadOptions::limits`].
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {
     PlySource::open_whole(name, bytes, options, &Silent)?.into_read()
 }

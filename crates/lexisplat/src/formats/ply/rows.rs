@@ -1,4 +1,4 @@
-//! Finds the vertex rows in the bytes after a header, and gives them out a chunk at a time.
+//! The vertex rows in the bytes after a header, a chunk at a time.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -15,15 +15,15 @@ use crate::support::error::{Error, FormatError, Result};
 /// The vertex rows of a file.
 #[derive(Debug)]
 pub(super) enum Rows<'a> {
-    /// Rows as they lie in the file.
+    /// Binary rows.
     Binary(Packed<'a>),
-    /// Lines, which become little-endian rows on request.
+    /// Lines of text. They become little-endian rows on request.
     Ascii(AsciiRows<'a>),
 }
 
 impl<'a> Rows<'a> {
     /// Finds the rows of the vertex element in `data`, which are the bytes after the header, and checks that all of
-    /// them are present. Harmless oddities are added to `warnings`.
+    /// them are present. Adds warnings about harmless faults to `warnings`.
     pub(super) fn locate(
         file: &'a str,
         header: &Header,
@@ -60,7 +60,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Returns where `element`, which starts at `start`, ends. It must end inside `data`.
+/// Returns the end of `element`, which starts at `start`. It must be inside `data`.
 fn skip(element: &Element, data: &[u8], start: usize, big: bool) -> std::result::Result<usize, FormatError> {
     let Some(row) = element.row_bytes() else { return skip_lists(element, data, start, big) };
     let found = (data.len() - start) as u64;
@@ -76,7 +76,7 @@ fn skip(element: &Element, data: &[u8], start: usize, big: bool) -> std::result:
     Ok(start + usize::try_from(expected).unwrap_or(data.len() - start))
 }
 
-/// [`skip`] for an element with lists, whose rows differ in length.
+/// Does the same as [`skip`] for an element with lists, whose rows differ in length.
 fn skip_lists(
     element: &Element,
     data: &[u8],
@@ -109,7 +109,7 @@ fn skip_lists(
     Ok(at)
 }
 
-/// Compares the `left` bytes after the vertices with what the elements after them need.
+/// Compares the `left` bytes after the vertices with the sizes of the elements after them.
 fn warn_about_the_end(after: &[Element], left: u64, warnings: &mut Vec<String>) {
     let mut needed = 0_u64;
     for element in after {

@@ -2,16 +2,16 @@
 
 /// A value of a PLY property.
 pub(super) trait Scalar: Copy {
-    /// Bytes of one value.
+    /// Number of bytes of one value.
     const BYTES: usize = size_of::<Self>();
 
-    /// The value in `bytes`, which are [`Self::BYTES`] long.
+    /// Returns the value in `bytes`, which are [`Self::BYTES`] long.
     fn load<const BIG: bool>(bytes: &[u8]) -> Self;
-    /// The nearest f32; infinite if there is none.
+    /// Returns the nearest f32; infinite if there is none.
     fn to_f32(self) -> f32;
-    /// The value; all types fit.
+    /// Returns the value as f64, which holds the values of all types.
     fn to_f64(self) -> f64;
-    /// The value as the length of a list; `None` if it is negative.
+    /// Returns the value as the length of a list; `None` if it is negative.
     fn to_length(self) -> Option<usize>;
     /// Appends the value of `text` in little-endian bytes; `None` if `text` is no such value.
     fn push_text(text: &str, bytes: &mut Vec<u8>) -> Option<()>;

@@ -13,7 +13,7 @@ use crate::scene::extra::ScalarType;
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Dialect {
-    /// INRIA's layout, which 3DGS-MCMC, Pixel-GS and this crate write too.
+    /// INRIA's code, or a program that writes the same layout: 3DGS-MCMC, Pixel-GS and this crate.
     Inria,
     /// gsplat's exporter: INRIA's order without normals.
     Gsplat,
@@ -23,7 +23,7 @@ pub enum Dialect {
     Brush,
     /// Postshot.
     Postshot,
-    /// None of these.
+    /// Another program.
     Other,
 }
 
@@ -33,17 +33,17 @@ pub enum Dialect {
 pub struct PlySummary {
     /// Probable writer.
     pub dialect: Dialect,
-    /// How the file stores values.
+    /// The encoding of the values.
     pub format: Format,
-    /// Size of the whole file.
+    /// Number of bytes of the whole file.
     pub file_bytes: u64,
-    /// Size of the header.
+    /// Number of bytes of the header.
     pub header_bytes: u64,
-    /// Bytes one vertex would take in binary.
+    /// Number of bytes of one vertex in binary.
     pub row_bytes: u64,
-    /// Vertices in the file, before any were dropped.
+    /// Number of vertices in the file, also dropped ones.
     pub vertices: u64,
-    /// Vertices dropped because of NaN or infinite values.
+    /// Number of vertices that were dropped because of NaN or infinite values.
     pub dropped: u64,
     /// Vertex properties in file order.
     pub properties: Vec<(String, ScalarType)>,
@@ -52,7 +52,7 @@ pub struct PlySummary {
 }
 
 impl PlySummary {
-    /// Summarises a file of `file_bytes` with this header. The caller sets `dropped`.
+    /// Creates the description of a file of `file_bytes` bytes with this header. The caller sets `dropped`.
     pub(super) fn new(header: &Header, layout: &Layout, file_bytes: u64) -> Self {
         let vertex = &header.elements[layout.vertex];
         let scalar = |p: &Property| Some((p.name.clone(), p.kind.scalar()?));

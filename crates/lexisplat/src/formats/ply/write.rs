@@ -15,17 +15,18 @@ use crate::support::sink::Sink;
 use std::collections::HashSet;
 use std::io::{self, Write};
 
-/// Rows formatted in memory before they are written: 8 MiB at 248 bytes a row.
+/// Number of rows that are made in memory before they are written: 8 MiB at 248 bytes a row.
 const BLOCK_ROWS: usize = 32 * ROWS_PER_TASK;
 
-/// Floats of a row besides normals and SH-rest.
+/// Number of floats of a row besides normals and SH-rest.
 const FIXED_FLOATS: usize = POSITION.len() + DC.len() + OPACITY.len() + SCALE.len() + ROTATION.len();
 
 /// Writes `splats`. Returns the number of bytes written.
 ///
 /// Values are little-endian and in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
-/// own types. Positions of a scene with an offset are doubles, and the offset is put back. Normals are zeros if the scene has none, and left out if an extra besides has one of their names. The
-/// scene's comments are written too. If the scene is anti-aliased and no comment says so, a comment is added.
+/// own types. Positions of a scene with an offset are doubles to which the offset is added. Normals are zeros if the scene
+/// has none. They are left out if an extra has one of their names. The comments of the scene follow. If the scene is
+/// anti-aliased and has no mark in a comment, a comment is added.
 ///
 /// # Errors
 /// [`Error::Io`] and [`Error::Writer`] for the sink, [`Error::Parameter`] if the arrays differ in length or an extra's
@@ -34,8 +35,8 @@ pub fn write<'a>(sink: impl Into<Sink<'a>>, splats: &Splats) -> Result<u64> {
     write_parts(sink.into(), splats, splats.has_normals(), splats.len(), &Silent, |write| write(splats))
 }
 
-/// Writes a scene of `count` Gaussians that `each` hands on part by part, with normals if `has_normals`. `like` gives its
-/// other properties and comments and may hold any number of Gaussians. Returns the number of bytes written.
+/// Writes a scene of `count` Gaussians that `each` passes on part by part, with normals if `has_normals`. `like` has the
+/// other properties and the comments of the scene, and any number of Gaussians. Returns the number of bytes written.
 pub(crate) fn write_parts(
     sink: Sink<'_>,
     like: &Splats,
@@ -56,7 +57,7 @@ pub(crate) fn write_parts(
     })
 }
 
-/// Returns the names of the normals' properties, of which there are none if an extra has one of the names instead.
+/// Returns the names of the normals. The list is empty if an extra has one of the names.
 fn normal_names(splats: &Splats, has_normals: bool) -> &'static [&'static str] {
     let stands_for = |name: &String| NORMAL.contains(&name.as_str());
     match has_normals || !splats.geometry.extras.iter().any(|extra| stands_for(&extra.name)) {
@@ -65,7 +66,7 @@ fn normal_names(splats: &Splats, has_normals: bool) -> &'static [&'static str] {
     }
 }
 
-/// Returns the names of the properties that 3DGS defines, in order. Those of the normals are `normal`.
+/// Returns the names of the properties that 3DGS defines, in order. `normal` has the names of the normals.
 fn names(rest: usize, normal: &'static [&'static str]) -> impl Iterator<Item = String> {
     let fixed = |names: &'static [&'static str]| names.iter().map(|&n| n.to_owned());
     fixed(&POSITION)
@@ -110,8 +111,8 @@ fn header(splats: &Splats, normal: &'static [&'static str], count: usize) -> Str
     text
 }
 
-/// Returns the scene's comments, each on one line, changed to agree with the scene's anti-aliasing mark. For writers of
-/// further formats.
+/// Returns the scene's comments, each on one line, changed to agree with the scene's anti-aliasing mark. It is for writers
+/// of further formats.
 #[must_use]
 pub fn comments(meta: &SceneMeta) -> Vec<String> {
     let mut out: Vec<String> =
@@ -124,12 +125,12 @@ pub fn comments(meta: &SceneMeta) -> Vec<String> {
     out
 }
 
-/// How scenes with the same properties become rows.
+/// The layout of the rows of scenes with the same properties.
 struct RowLayout {
     row_bytes: usize,
-    /// Floats of a normal; 0 if normals are left out.
+    /// Number of floats of a normal; 0 if normals are left out.
     normal: usize,
-    /// Added to positions, which are doubles then.
+    /// The offset that is added to positions, which are then doubles.
     offset: Option<Offset>,
 }
 
@@ -142,7 +143,7 @@ impl RowLayout {
         Self { row_bytes: floats * size_of::<f32>() + more + extras, normal: normal.len(), offset }
     }
 
-    /// Writes `splats` to `writer` by way of `block`.
+    /// Writes `splats` to `writer`. `block` is working memory.
     fn write(&self, splats: &Splats, block: &mut [u8], writer: &mut dyn Write) -> io::Result<()> {
         for start in (0..splats.len()).step_by(BLOCK_ROWS) {
             let rows = &mut block[..self.row_bytes * BLOCK_ROWS.min(splats.len() - start)];

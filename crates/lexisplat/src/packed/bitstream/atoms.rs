@@ -50,7 +50,7 @@ impl WholeAtoms {
         Self { degree, numbers, with_axes }
     }
 
-    /// Codes the numbers of `learned` atoms. A decoder passes no numbers; the result has those that it decoded.
+    /// Codes the numbers of `learned` atoms. A decoder passes no numbers. The result has the decoded numbers.
     fn code(&self, coder: &mut dyn Bits, learned: usize) -> Self {
         let per_channel = self.degree.rest_per_channel();
         let mut odds = [[[SignedBitModel::default(); SIZES]; CHANNELS]; DEGREES];
@@ -104,7 +104,7 @@ impl WholeAtoms {
     /// Reads the bytes that [`Self::write`] wrote for `learned` atoms.
     ///
     /// # Errors
-    /// The broken rule for bytes that are not the bits of so many atoms, or not of these alone.
+    /// The broken rule for bytes that are not exactly the bits of these atoms.
     pub(in crate::packed) fn read(
         bytes: &[u8],
         degree: ShDegree,
@@ -159,10 +159,10 @@ pub(in crate::packed) fn axes(degree: ShDegree) -> Vec<f32> {
     let (dim, per_channel) = (degree.rest(), degree.rest_per_channel());
     let mut rows = vec![0.0; dim * dim];
     for (j, row) in rows.chunks_exact_mut(dim.max(1)).enumerate() {
-        for (c, part) in COLOURS[j / per_channel].iter().enumerate() {
+        for (c, weight) in COLOURS[j / per_channel].iter().enumerate() {
             #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
             {
-                row[c * per_channel + j % per_channel] = *part as f32;
+                row[c * per_channel + j % per_channel] = *weight as f32;
             }
         }
     }

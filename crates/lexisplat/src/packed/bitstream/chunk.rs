@@ -1,8 +1,9 @@
-//! Coding of a chunk: its ranges are a base, refinements, parts of SH-rest and interim changes, all in the same lanes.
+//! Coding of a chunk: its ranges are a base, refinements, SH parts and interim changes, all in the same lanes.
 
-use super::fill_in::interim;
+use super::coarseness::Refinements;
 use super::geometry_syntax::{GeometrySyntax, Group};
 use super::integer_model::Steering;
+use super::interim::interim;
 use super::parameters::CHANGES;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest, RestForm};
@@ -42,15 +43,15 @@ pub(in crate::packed) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<I
 
 /// A receiver of the decoded Gaussians of a chunk. It is a trait, since closures are not inlined into vector code.
 pub(in crate::packed) trait Sink {
-    /// Takes Gaussian `number` of each lane in `set`. It has the index `in_block` in its block. `levels` are the number of
-    /// refinements of the chunk, and of those that are missing. Returns the rule that a damaged file breaks.
+    /// Takes Gaussian `number` of each lane in `set`. It has the index `in_block` in its block. Returns the rule that a
+    /// damaged file breaks.
     fn group(
         &mut self,
         number: usize,
         in_block: usize,
         set: u32,
         group: &Group,
-        levels: [usize; 2],
+        refinements: Refinements,
     ) -> Result<(), Broken>;
 
     /// Takes the SH-rest of a block of Gaussians. The block begins with Gaussian `number` of each lane.
@@ -68,22 +69,22 @@ pub(in crate::packed) struct Form {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(in crate::packed) struct LayerForm {
     /// Number of refinements.
-    pub(in crate::packed) levels: usize,
-    /// Number of parts of SH-rest.
-    pub(in crate::packed) parts: usize,
+    pub(in crate::packed) refinements: usize,
+    /// Number of SH parts.
+    pub(in crate::packed) sh_parts: usize,
     /// Whether chunks have a range of interim changes.
     pub(in crate::packed) interim: bool,
 }
 
 impl LayerForm {
-    /// Returns the number of ranges of a chunk: a base, refinements, parts of SH-rest, and interim changes.
+    /// Returns the number of ranges of a chunk: a base, refinements, SH parts, and interim changes.
     pub(in crate::packed) fn ranges(self) -> usize {
         self.interim_range() + usize::from(self.interim)
     }
 
     /// Returns the index of the range of interim changes, if chunks have one.
     pub(in crate::packed) fn interim_range(self) -> usize {
-        1 + self.levels + self.parts
+        1 + self.refinements + self.sh_parts
     }
 }
 
@@ -95,12 +96,12 @@ impl Form {
         layer: LayerForm,
         coded: &[CodedGaussian],
     ) -> Option<CodedChunk> {
-        let levels = layer.levels;
+        let refinements = layer.refinements;
         let lanes = lanes(coded.len());
         let starts = starts(coded.len(), lanes);
         let mut ranges = vec![SymbolRecorder::default(); layer.ranges()];
         let mut sums = vec![Sums::default(); layer.ranges()];
-        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, levels), Rest::default());
+        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, refinements), Rest::default());
         let none = CodedGaussian::default();
         let mut bounds = Extent([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]);
         let sets: Vec<u32> = sets(coded.len(), lanes).collect();
@@ -108,8 +109,8 @@ impl Form {
             let first = block * BLOCK;
             rest.clear();
             let (base, finer) = ranges.split_first_mut()?;
-            let (finer, parts) = finer.split_at_mut_checked(levels)?;
-            let (parts, changed) = parts.split_at_mut_checked(layer.parts)?;
+            let (finer, sh_parts) = finer.split_at_mut_checked(refinements)?;
+            let (sh_parts, changed) = sh_parts.split_at_mut_checked(layer.sh_parts)?;
             for (i, &set) in sets.iter().enumerate() {
                 let of = |l: usize| coded.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
                 let group: [&CodedGaussian; LANES] = std::array::from_fn(of);
@@ -118,7 +119,7 @@ impl Form {
                 walk.base(base, set, Some(&coded), &mut group).ok()?;
                 sums[0].base(set, &group);
                 for (k, range) in finer.iter_mut().enumerate() {
-                    refine(range, set, &mut group, levels - k).ok()?;
+                    refine(range, set, &mut group, refinements - k).ok()?;
                     sums[1 + k].refined(set, &group);
                 }
                 if let Some(range) = changed.first_mut() {
@@ -128,25 +129,27 @@ impl Form {
                     sums[layer.interim_range()].interim(set, &group);
                 }
                 rest.push(set, group.colour);
-                bounds.add(set, &group, frame, levels)?;
+                bounds.add(set, &group, frame, refinements)?;
             }
             let wanted: Lanes<Vec<&CodedGaussian>> = std::array::from_fn(|l| {
                 let there = sets.iter().enumerate().filter(|(_, set)| has(**set, l));
                 there.filter_map(|(i, _)| coded.get(starts[l] + first + i)).collect()
             });
-            for (part, range) in parts.iter_mut().enumerate() {
-                rest.part(range, Some(&wanted), &self.rest, part).ok()?;
-                sums[1 + levels + part].rest(&rest, &self.rest, part);
+            for (sh_part, range) in sh_parts.iter_mut().enumerate() {
+                rest.sh_part(range, Some(&wanted), &self.rest, sh_part).ok()?;
+                sums[1 + refinements + sh_part].rest(&rest, &self.rest, sh_part);
             }
         }
-        let ranges = ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect();
+        let ranges = ranges.into_iter().zip(sums);
+        let ranges =
+            ranges.map(|(symbols, sums)| RecordedRange { symbols, integers: sums.finish() }).collect();
         let cell = coded.first().map_or(0, |gaussian| gaussian.cell);
         let energy = coded.iter().map(|gaussian| f64::from(gaussian.energy)).sum();
         Some(CodedChunk { gaussians: coded.len(), cell, bounds: bounds.0, energy, ranges })
     }
 
     /// Decodes a chunk of `gaussians` Gaussians from the ranges that are there, and hands the Gaussians to `sink`.
-    /// Refinements after a missing refinement are ignored, and so are parts after a missing part. Returns the rule that a
+    /// Refinements after a missing refinement are ignored, and so are SH parts after a missing one. Returns the rule that a
     /// damaged file breaks, and the number of the range that breaks it.
     #[inline(always)]
     pub(in crate::packed) fn decode(
@@ -158,25 +161,25 @@ impl Form {
         want: Want,
         sink: &mut impl Sink,
     ) -> Result<Played, InRange> {
-        let levels = layer.levels;
+        let refinements = layer.refinements;
         let lanes = lanes(gaussians);
         let of = |k: usize| ranges.get(k).copied().flatten();
         let decoder = |k: usize| match of(k) {
             Some(bytes) => SymbolDecoder::new(lookup, bytes, lanes, want.bits).map(Some).map_err(in_range(k)),
             None => Ok(None),
         };
-        let first_part = 1 + levels;
+        let first_sh = 1 + refinements;
         let mut base = decoder(0)?.ok_or_else(|| in_range(0)(Broken("is missing")))?;
         let all = |kinds: std::ops::Range<usize>| -> Result<Vec<_>, InRange> {
             kinds.map(decoder).map_while(Result::transpose).collect()
         };
-        let mut finer: Vec<SymbolDecoder<'_>> = all(1..first_part)?;
-        let mut parts: Vec<SymbolDecoder<'_>> = all(first_part..first_part + layer.parts)?;
+        let mut finer: Vec<SymbolDecoder<'_>> = all(1..first_sh)?;
+        let mut sh_parts: Vec<SymbolDecoder<'_>> = all(first_sh..first_sh + layer.sh_parts)?;
         let mut changed = if layer.interim { decoder(layer.interim_range())? } else { None };
-        let missing = levels - finer.len();
+        let of_chunk = Refinements { all: refinements, missing: refinements - finer.len() };
         let steps = gaussians.div_ceil(lanes);
         let mut sums = vec![Sums::default(); if want.sums { layer.ranges() } else { 0 }];
-        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, levels), Rest::default());
+        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, refinements), Rest::default());
         // A group is large, so one is reused for all steps.
         let mut group = Group::default();
         for (step, set) in sets(gaussians, lanes).enumerate() {
@@ -185,7 +188,7 @@ impl Form {
                 sums[0].base(set, &group);
             }
             for (k, range) in finer.iter_mut().enumerate() {
-                refine(range, set, &mut group, levels - k).map_err(in_range(1 + k))?;
+                refine(range, set, &mut group, refinements - k).map_err(in_range(1 + k))?;
                 if want.sums {
                     sums[1 + k].refined(set, &group);
                 }
@@ -196,26 +199,26 @@ impl Form {
                     sums[layer.interim_range()].interim(set, &group);
                 }
             }
-            sink.group(step, rest.len(), set, &group, [levels, missing]).map_err(in_range(0))?;
+            sink.group(step, rest.len(), set, &group, of_chunk).map_err(in_range(0))?;
             rest.push(set, group.colour);
             if rest.len() == BLOCK || step + 1 == steps {
-                for (part, range) in parts.iter_mut().enumerate() {
-                    rest.part(range, None, &self.rest, part).map_err(in_range(first_part + part))?;
+                for (sh_part, range) in sh_parts.iter_mut().enumerate() {
+                    rest.sh_part(range, None, &self.rest, sh_part).map_err(in_range(first_sh + sh_part))?;
                     if want.sums {
-                        sums[1 + levels + part].rest(&rest, &self.rest, part);
+                        sums[1 + refinements + sh_part].rest(&rest, &self.rest, sh_part);
                     }
                 }
                 // Symbols of damaged files may take no bytes, so the decoders are checked before anything is made of the
                 // symbols.
-                for (range, decoder) in numbered(layer, &base, &finer, &parts, &changed) {
+                for (range, decoder) in numbered(layer, &base, &finer, &sh_parts, &changed) {
                     decoder.check().map_err(in_range(range))?;
                 }
-                sink.rest(step + 1 - rest.len(), &rest).map_err(in_range(first_part))?;
+                sink.rest(step + 1 - rest.len(), &rest).map_err(in_range(first_sh))?;
                 rest.clear();
             }
         }
         let mut bits = BitCounts::default();
-        for (range, decoder) in numbered(layer, &base, &finer, &parts, &changed) {
+        for (range, decoder) in numbered(layer, &base, &finer, &sh_parts, &changed) {
             decoder.check_end().map_err(in_range(range))?;
             decoder.bit_counts.iter().for_each(|counts| bits.add(counts));
         }
@@ -240,12 +243,20 @@ fn numbered<'d, 'a>(
     layer: LayerForm,
     base: &'d SymbolDecoder<'a>,
     finer: &'d [SymbolDecoder<'a>],
-    parts: &'d [SymbolDecoder<'a>],
+    sh_parts: &'d [SymbolDecoder<'a>],
     changed: &'d Option<SymbolDecoder<'a>>,
 ) -> impl Iterator<Item = (usize, &'d SymbolDecoder<'a>)> {
-    let parts = (1 + layer.levels..).zip(parts);
+    let sh_parts = (1 + layer.refinements..).zip(sh_parts);
     let changed = changed.iter().map(move |decoder| (layer.interim_range(), decoder));
-    std::iter::once((0, base)).chain((1..).zip(finer)).chain(parts).chain(changed)
+    std::iter::once((0, base)).chain((1..).zip(finer)).chain(sh_parts).chain(changed)
+}
+
+/// A range whose symbols are recorded.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct RecordedRange {
+    pub(in crate::packed) symbols: SymbolRecorder,
+    /// CRC-32 of the integers that the range decodes to.
+    pub(in crate::packed) integers: u32,
 }
 
 /// A chunk whose symbols are recorded.
@@ -258,8 +269,7 @@ pub(in crate::packed) struct CodedChunk {
     pub(in crate::packed) bounds: [[f32; 3]; 2],
     /// The sum of the energies of its Gaussians: squared changes of pictures without each of them.
     pub(in crate::packed) energy: f64,
-    /// The symbols of each range, and the checksum of its integers.
-    pub(in crate::packed) ranges: Vec<(SymbolRecorder, u32)>,
+    pub(in crate::packed) ranges: Vec<RecordedRange>,
 }
 
 /// Least and largest coordinates of positions.
@@ -267,8 +277,8 @@ struct Extent([[f32; 3]; 2]);
 
 impl Extent {
     /// Extends to the positions of the lanes in `set`. `None` for values that no decoder accepts.
-    fn add(&mut self, set: u32, group: &Group, frame: &Frame, levels: usize) -> Option<()> {
-        let drawn = Drawn::new(frame, group, [levels, 0], &[false; LANES]);
+    fn add(&mut self, set: u32, group: &Group, frame: &Frame, refinements: usize) -> Option<()> {
+        let drawn = Drawn::new(frame, group, Refinements { all: refinements, missing: 0 }, &[false; LANES]);
         let [least, most] = &mut self.0;
         for l in (0..LANES).filter(|&l| has(set, l)) {
             for (k, position) in drawn.position.iter().enumerate() {
@@ -334,18 +344,18 @@ impl Sums {
 
     /// Adds each Gaussian's number of nonzeros, and the atom and the value of each. For an exact row, adds -1 and the bits
     /// of the row.
-    fn rest(&mut self, rest: &Rest, form: &RestForm, part: usize) {
+    fn rest(&mut self, rest: &Rest, form: &RestForm, sh_part: usize) {
         for l in 0..LANES {
             let mut cursor = Cursor::default();
             for i in (0..rest.len()).filter(|&i| has(rest.of(i).0, l)) {
-                match rest.coded(form, part, i, l, &mut cursor) {
+                match rest.coded(form, sh_part, i, l, &mut cursor) {
                     Coded::Exact(row) => {
                         self.add(l, &[-1]);
                         row.iter().for_each(|v| self.add(l, &[v.to_bits().cast_signed()]));
                     }
-                    Coded::Code(from, count) => {
+                    Coded::Code { first, count } => {
                         self.add(l, &[count as i32]);
-                        for (atom, value) in rest.nonzeros(part, from, count, l) {
+                        for (atom, value) in rest.nonzeros(sh_part, first, count, l) {
                             self.add(l, &[atom.into(), value]);
                         }
                     }

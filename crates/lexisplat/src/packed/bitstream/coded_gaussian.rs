@@ -1,6 +1,6 @@
 //! The values of a Gaussian that the encoder codes.
 
-use crate::packed::bitstream::parameters::{CHANGES, TARGETS};
+use crate::packed::bitstream::parameters::{CHANGES, ColourAndShape, TARGETS};
 use crate::packed::bitstream::values::{across, main_axis};
 use crate::support::maths::{Vec3, atan2, dot, square_of_axis};
 
@@ -9,8 +9,7 @@ use crate::support::maths::{Vec3, atan2, dot, square_of_axis};
 pub(in crate::packed) struct CodedGaussian {
     /// Number of its cell on the Morton curve. It is at least that of the previous Gaussian in its lane.
     pub(in crate::packed) cell: u64,
-    /// The colour class and the shape class.
-    pub(in crate::packed) classes: [u8; 2],
+    pub(in crate::packed) classes: ColourAndShape<u8>,
     /// The logarithms of the scales and of the opacity, and the coordinates of the base colour, as multiples of
     /// `2^-VALUE_BITS`.
     pub(in crate::packed) values: [i32; TARGETS],

@@ -1,9 +1,9 @@
 //! The values that are drawn, from decoded integers.
 
-use super::fill_in::change;
+use super::coarseness::{Refinements, dropped, factor};
 use super::geometry_syntax::Group;
 use super::integer_model::VALUE_BITS;
-use super::levels::{dropped, factor};
+use super::interim::change;
 use super::parameters::{DC, KINDS, LAST_CLASS, OPACITY, TARGETS};
 use super::values::{logits, numbers, powers, rotations};
 use crate::packed::bitstream::broken::Broken;
@@ -47,10 +47,10 @@ impl Drawn {
     pub(in crate::packed) fn new(
         frame: &Frame,
         group: &Group,
-        [levels, missing]: [usize; 2],
-        alone: &Lanes<bool>,
+        Refinements { all, missing }: Refinements,
+        interim: &Lanes<bool>,
     ) -> Self {
-        let (coarse, finer) = (factor(levels), factor(missing));
+        let (coarse, finer) = (factor(all), factor(missing));
         let mut values = group.coarse;
         // Scales and opacities have no coarse steps.
         for t in DC..TARGETS {
@@ -61,8 +61,8 @@ impl Drawn {
                 values[t][l] = values[t][l].wrapping_add(over.wrapping_mul(group.steps[t][l]));
             }
         }
-        if alone.iter().any(|&alone| alone) {
-            change(&mut values, &group.interim, &frame.interim, alone);
+        if interim.iter().any(|&interim| interim) {
+            change(&mut values, &group.interim, &frame.interim, interim);
         }
         // The limit is a power of two. If a number is within it, `number ^ sign` has no bits at or above it.
         let mut beyond = [0; LANES];

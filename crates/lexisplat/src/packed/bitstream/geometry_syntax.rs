@@ -3,15 +3,15 @@
 //! Every value is coded as its difference from a prediction, in units of a step. The prediction and the step depend only on
 //! coarse integers that come earlier in the same range. So refinements may be missing.
 
+use super::coarseness::{dropped, factor};
 use super::integer_model::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
-use super::levels::{dropped, factor};
 use super::neighbour_context::{AVERAGED, NeighbourContext};
 use super::streams::Stream;
 use super::values::{MAX_LOG_OPACITY, rotations};
 use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::morton;
-use crate::packed::bitstream::parameters::{CHANGES, DC, LAST_CLASS, OPACITY, TARGETS};
+use crate::packed::bitstream::parameters::{CHANGES, ColourAndShape, DC, LAST_CLASS, OPACITY, TARGETS};
 use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
 use crate::packed::entropy::symbols::Symbols;
 
@@ -63,15 +63,21 @@ pub(in crate::packed) struct Group {
 pub(in crate::packed) struct GeometrySyntax<'a> {
     steering: &'a Steering,
     /// Number of refinements.
-    levels: usize,
+    refinements: usize,
     around: NeighbourContext,
     cell: Lanes<u64>,
     gap_bits: Lanes<u32>,
 }
 
 impl<'a> GeometrySyntax<'a> {
-    pub(in crate::packed) fn new(steering: &'a Steering, levels: usize) -> Self {
-        Self { steering, levels, around: NeighbourContext::default(), cell: [0; LANES], gap_bits: [0; LANES] }
+    pub(in crate::packed) fn new(steering: &'a Steering, refinements: usize) -> Self {
+        Self {
+            steering,
+            refinements,
+            around: NeighbourContext::default(),
+            cell: [0; LANES],
+            gap_bits: [0; LANES],
+        }
     }
 
     /// Codes the base of the next Gaussian of each lane in `set`, and stores it in `group`, which may hold an earlier
@@ -89,7 +95,7 @@ impl<'a> GeometrySyntax<'a> {
         let gaussian = |l: usize| coded.map(|coded| coded[l]);
         let context = each(|l| self.gap_bits[l].min(GAP_CONTEXTS));
         let before = self.cell;
-        let slot = |stream: Stream| stream.at(self.levels);
+        let slot = |stream: Stream| stream.at(self.refinements);
         let gap = s.wide(slot(Stream::Cell), context, set, |l| {
             gaussian(l).map_or(0, |t| t.cell.wrapping_sub(before[l]))
         });
@@ -113,14 +119,14 @@ impl<'a> GeometrySyntax<'a> {
         } else {
             std::array::from_fn(|k| [p.means.get(k).copied().unwrap_or(0); LANES])
         };
-        let [colour, shape] = classes(s, set, coded, known, &around, self.levels)?;
+        let ColourAndShape { colour, shape } = classes(s, set, coded, known, &around, self.refinements)?;
 
         let features_of = |class: &Lanes<u32>| each(|l| (class[l] << FEATURE_BITS).cast_signed());
         let zeros = [0; LANES];
         let mut features: [Lanes; COEFFICIENTS - 1] =
             [zeros, features_of(&colour), features_of(&shape), zeros, zeros, zeros];
         (group.number, group.cell, group.colour, group.shape) = (self.cell, cell, colour, shape);
-        let coarse = factor(self.levels);
+        let coarse = factor(self.refinements);
         let mut remembered = [zeros; AVERAGED];
         // All coordinates of a base colour have the same step.
         let colour_step = p.step(DC, &colour);
@@ -179,10 +185,13 @@ impl<'a> GeometrySyntax<'a> {
         group: &mut Group,
     ) {
         let p = self.steering;
-        let coarse = factor(self.levels);
+        let coarse = factor(self.refinements);
         (group.axis_bits, group.needle) = p.axis_bits(&group.shape, &scales);
         let [directions, turns] = &group.axis_bits;
-        let left = [each(|l| dropped(directions[l], self.levels)), each(|l| dropped(turns[l], self.levels))];
+        let left = [
+            each(|l| dropped(directions[l], self.refinements)),
+            each(|l| dropped(turns[l], self.refinements)),
+        ];
         group.moves = p.move_logs(&group.shape, &scales);
         if let Some(coded) = coded {
             for l in (0..LANES).filter(|&l| has(set, l)) {
@@ -207,13 +216,14 @@ impl<'a> GeometrySyntax<'a> {
             let count = each(|l| full[l] - left[l]);
             let wanted = &group.wanted_rotation[k];
             group.rotation[k] =
-                s.bits(Stream::Rotation.at(self.levels), count, set, |l| wanted[l] >> left[l]);
+                s.bits(Stream::Rotation.at(self.refinements), count, set, |l| wanted[l] >> left[l]);
         }
         for (k, stream) in POSITION_STREAMS.into_iter().enumerate() {
             group.fineness[k] = each(|l| p.fineness(group.moves[k][l]));
             let wanted = &group.wanted[TARGETS + k];
-            group.base[TARGETS + k] =
-                s.signed(stream.at(self.levels), group.fineness[k], set, |l| coarsened(wanted[l], coarse));
+            group.base[TARGETS + k] = s.signed(stream.at(self.refinements), group.fineness[k], set, |l| {
+                coarsened(wanted[l], coarse)
+            });
         }
     }
 }
@@ -226,25 +236,26 @@ fn classes<S: Symbols>(
     coded: Option<&[&CodedGaussian; LANES]>,
     known: bool,
     around: &[Lanes; AVERAGED],
-    levels: usize,
-) -> Result<[Lanes<u32>; 2], Broken> {
+    refinements: usize,
+) -> Result<ColourAndShape<Lanes<u32>>, Broken> {
     const LAST: i32 = LAST_CLASS as i32;
-    let level = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
-    let class = |k: usize, l: usize| coded.map_or(0, |coded| u32::from(coded[l].classes[k]));
+    let rounded = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
+    let class =
+        |l: usize| coded.map_or_else(ColourAndShape::default, |coded| coded[l].classes.map(u32::from));
     let none = [0; LANES];
-    let context = if known { each(|l| 1 + level(around[COLOUR][l])) } else { none };
-    let colour = s.symbols(Stream::ColourClass.at(levels), context, set, |l| class(0, l));
+    let context = if known { each(|l| 1 + rounded(around[COLOUR][l])) } else { none };
+    let colour = s.symbols(Stream::ColourClass.at(refinements), context, set, |l| class(l).colour);
     let (mut context, mut nearest) = (none, none);
     for l in 0..LANES {
         let own = (colour[l] << FEATURE_BITS).cast_signed();
         let expected = own.wrapping_add(around[SHAPE][l]).clamp(0, LAST << FEATURE_BITS);
         // The context is in half classes, so that it also says on which side of the rounded value the class may lie.
         let below = (expected - ONE / 4) >> FEATURE_BITS << FEATURE_BITS;
-        context[l] = if known { 1 + level(2 * (expected - below)) } else { 0 };
-        nearest[l] = level(expected);
+        context[l] = if known { 1 + rounded(2 * (expected - below)) } else { 0 };
+        nearest[l] = rounded(expected);
     }
-    let over = s.signed(Stream::ShapeClass.at(levels), context, set, |l| {
-        class(1, l).wrapping_sub(nearest[l]).cast_signed()
+    let over = s.signed(Stream::ShapeClass.at(refinements), context, set, |l| {
+        class(l).shape.wrapping_sub(nearest[l]).cast_signed()
     });
     let mut shape = none;
     let mut beyond = false;
@@ -252,7 +263,7 @@ fn classes<S: Symbols>(
         shape[l] = nearest[l].wrapping_add(over[l].cast_unsigned());
         beyond |= colour[l] > u32::from(LAST_CLASS) || shape[l] > u32::from(LAST_CLASS);
     }
-    if beyond { Err(Broken("has a class above 15")) } else { Ok([colour, shape]) }
+    if beyond { Err(Broken("has a class above 15")) } else { Ok(ColourAndShape { colour, shape }) }
 }
 
 /// Share of a step by which a difference must exceed the middle between two values to be rounded away from zero. The value

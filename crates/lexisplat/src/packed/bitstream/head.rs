@@ -6,20 +6,20 @@ use super::axes::{axes_of, turn_of};
 use super::broken::{BrokenHead, must};
 use super::bytes::{ByteReader, Fields, put_f24, put_number};
 use super::chunk::Form;
-use super::fill_in::MOST_STEP;
 use super::index::Index;
 use super::integer_model::{Integers, Steering, Step, VALUE_BITS};
-use super::mean_view::{MeanView, SOFTENINGS};
+use super::interim::MOST_STEP;
 use super::parameters::KINDS;
+use super::points_of_view::{PointsOfView, SOFTENINGS};
 use super::sh_codes::RestForm;
-use super::streams::REST_PARTS;
+use super::streams::SH_PARTS;
 use crate::packed::bitstream::drawn::Frame;
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters};
 use crate::support::limits::MAX_ATOMS;
 
 /// Largest binary logarithm of the unit of base colours.
 const MAX_DC_EXPONENT: u8 = 100;
-/// Number of bits of the number of points of view, and the place of the two flags after the number of parts.
+/// Number of bits of the number of points of view, and the place of the two flags after the number of SH parts.
 const POINTS_BITS: u32 = 4;
 const MARKS: u32 = 6;
 /// Number of bits of the binary logarithm of the unit of base colours. The flag of interim changes is the bit above.
@@ -43,7 +43,7 @@ pub(in crate::packed) struct Head {
     pub(in crate::packed) rest: RestForm,
     /// Steps of the interim changes of scales, opacities and base colours; `None` without interim changes.
     pub(in crate::packed) interim: Option<[u32; KINDS]>,
-    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) points_of_view: PointsOfView,
     pub(in crate::packed) integers: Integers,
     /// The turn that makes the axes of base colours.
     pub(in crate::packed) dc_turn: [i16; 4],
@@ -68,7 +68,7 @@ impl Head {
         most_dc: f64,
         rest: RestForm,
         atoms: &WholeAtoms,
-        mean_view: MeanView,
+        points_of_view: PointsOfView,
     ) -> Self {
         let mut dc_exponent = 0;
         while most_dc > MOST_DC * f64::from(dc_exponent).exp2() && dc_exponent < MAX_DC_EXPONENT {
@@ -79,7 +79,7 @@ impl Head {
             dictionary: atoms.write(),
             dc_exponent,
             rest,
-            mean_view,
+            points_of_view,
             dc_turn: turn_of(&p.dc_axes),
             frame: Frame {
                 origin: p.origin,
@@ -132,13 +132,13 @@ impl Head {
     pub(in crate::packed) fn write(&self) -> Vec<u8> {
         let mut out = Vec::new();
         put_number(&mut out, self.rest.atoms as u64);
-        let (points, parts) = (&self.mean_view.points, &self.rest.least);
+        let (points, sh_parts) = (&self.points_of_view.points, &self.rest.least);
         let is_promised = self.promised > 0.0;
         let marks = u8::from(is_promised) | u8::from(self.with_axes) << 1;
-        out.push(points.len() as u8 | (parts.len() as u8) << POINTS_BITS | marks << MARKS);
+        out.push(points.len() as u8 | (sh_parts.len() as u8) << POINTS_BITS | marks << MARKS);
         out.push(self.dc_exponent | u8::from(self.interim.is_some()) << EXPONENT_BITS);
-        // The last part is left out, since its smallest size is always 1.
-        out.extend(parts.iter().rev().skip(1).rev().map(|&least| least as u8));
+        // The last SH part is left out, since its smallest size is always 1.
+        out.extend(sh_parts.iter().rev().skip(1).rev().map(|&least| least as u8));
         self.interim.iter().flatten().for_each(|&step| put_number(&mut out, step.into()));
         let f = &self.frame;
         let step = if is_promised { self.promised } else { self.value_step };
@@ -146,16 +146,16 @@ impl Head {
             [&f.origin[..], &[f.cell, step], &f.dc_mean].concat().iter().flat_map(|x| x.to_le_bytes()),
         );
         out.extend(self.dc_turn.iter().flat_map(|x| x.to_le_bytes()));
-        let softening = (!points.is_empty()).then_some(&self.mean_view.softening);
+        let softening = (!points.is_empty()).then_some(&self.points_of_view.softening);
         out.extend(softening.into_iter().flat_map(|x| x.to_le_bytes()));
         points.as_flattened().iter().for_each(|&x| put_f24(&mut out, x));
         for step in self.integers.steps {
             out.extend(step.mantissa.to_le_bytes());
             out.extend(step.shift.to_le_bytes());
         }
-        for part in [&self.integers.write(), &self.tables, &self.dictionary] {
-            put_number(&mut out, part.len() as u64);
-            out.extend(part);
+        for block in [&self.integers.write(), &self.tables, &self.dictionary] {
+            put_number(&mut out, block.len() as u64);
+            out.extend(block);
         }
         self.index.write(&mut out);
         out
@@ -172,14 +172,14 @@ impl Head {
         let exponent = from.take("dc_exponent", ByteReader::u8)?;
         let (dc_exponent, interim) = (exponent & ((1 << EXPONENT_BITS) - 1), exponent >> EXPONENT_BITS == 1);
         let points = usize::from(flags & ((1 << POINTS_BITS) - 1));
-        let parts = usize::from(flags >> POINTS_BITS & ((1 << (MARKS - POINTS_BITS)) - 1));
+        let sh_parts = usize::from(flags >> POINTS_BITS & ((1 << (MARKS - POINTS_BITS)) - 1));
         let (is_promised, with_axes) = (flags >> MARKS & 1 == 1, flags >> (MARKS + 1) == 1);
-        let (fewest, most_atoms, most_parts) = if dim == 0 { (0, 0, 0) } else { (1, MAX_ATOMS, REST_PARTS) };
+        let (fewest, most_atoms, most_sh_parts) = if dim == 0 { (0, 0, 0) } else { (1, MAX_ATOMS, SH_PARTS) };
         must((fewest..=most_atoms).contains(&atoms), || {
             format!("'m' is {atoms}, not from {fewest} to {most_atoms}")
         })?;
-        must((fewest..=most_parts).contains(&parts), || {
-            format!("'flags': P is {parts}, not from {fewest} to {most_parts}")
+        must((fewest..=most_sh_parts).contains(&sh_parts), || {
+            format!("'flags': P is {sh_parts}, not from {fewest} to {most_sh_parts}")
         })?;
         must(!with_axes || (dim > 0 && atoms >= dim), || {
             format!("'flags': 'fixed' needs at least {} atoms, and m is {atoms}", dim.max(1))
@@ -187,11 +187,11 @@ impl Head {
         must(dc_exponent <= MAX_DC_EXPONENT, || {
             format!("'dc_exponent' is {dc_exponent}, above {MAX_DC_EXPONENT}")
         })?;
-        let mut least: Vec<u32> = Vec::with_capacity(parts);
-        for _ in 1..parts {
+        let mut least: Vec<u32> = Vec::with_capacity(sh_parts);
+        for _ in 1..sh_parts {
             least.push(from.take("least", ByteReader::u8)?.into());
         }
-        least.extend((parts > 0).then_some(1));
+        least.extend((sh_parts > 0).then_some(1));
         must(least.is_sorted_by(|a, b| a > b), || format!("'least' is {least:?}, which does not fall to 1"))?;
         let interim =
             if interim {
@@ -216,15 +216,15 @@ impl Head {
         let dc_mean = from.take("dc_mean", ByteReader::f32s)?;
         let dc_turn: [i16; 4] = from.take("dc_turn", ByteReader::i16s)?;
         let dc_axes = axes_of(dc_turn).ok_or_else(|| BrokenHead("'dc_turn' is 0".to_owned()))?;
-        let mut mean_view = MeanView::default();
+        let mut points_of_view = PointsOfView::default();
         if points > 0 {
-            mean_view.softening = from.take("softening", ByteReader::f32)?;
-            must(SOFTENINGS.contains(&mean_view.softening), || {
+            points_of_view.softening = from.take("softening", ByteReader::f32)?;
+            must(SOFTENINGS.contains(&points_of_view.softening), || {
                 "'softening' is not from 2^-60 to 2^60".to_owned()
             })?;
         }
         for _ in 0..points {
-            mean_view.points.push(from.take("points", ByteReader::f24s)?);
+            points_of_view.points.push(from.take("points", ByteReader::f24s)?);
         }
         let mut integers = Integers::default();
         for step in &mut integers.steps {
@@ -239,18 +239,18 @@ impl Head {
                 )
             })?;
         }
-        let mut part = |name: &str| {
+        let mut block = |name: &str| {
             let length = from.take(name, ByteReader::number32)? as usize;
             from.take(name, |from| from.bytes(length))
         };
-        integers.read(part("integers")?)?;
-        let (tables, dictionary) = (part("tables")?.to_vec(), part("dictionary")?.to_vec());
+        integers.read(block("integers")?)?;
+        let (tables, dictionary) = (block("tables")?.to_vec(), block("dictionary")?.to_vec());
         let mut head = Self {
             with_axes,
             dc_exponent,
             rest: RestForm { dim, atoms, least },
             interim,
-            mean_view,
+            points_of_view,
             integers,
             dc_turn,
             frame: Frame { origin, cell, dc_mean, dc_axes, ..Frame::default() },

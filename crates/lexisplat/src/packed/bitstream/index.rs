@@ -3,7 +3,7 @@
 use super::broken::{BrokenHead, must};
 use super::bytes::{ByteReader, Fields, put_bf16, put_number};
 use super::chunk::LayerForm;
-use super::levels::MAX_LEVELS;
+use super::coarseness::MAX_REFINEMENTS;
 
 /// Most layers of a file.
 pub(in crate::packed) const MAX_LAYERS: usize = 8;
@@ -46,7 +46,7 @@ pub(in crate::packed) struct Chunk {
     /// Coordinates that are at most the least, and at least the largest, of its positions; zeros if it is the only chunk.
     /// No decoder needs them.
     pub(in crate::packed) bounds: [[f32; 3]; 2],
-    /// The ranges by kind: the base, refinements, parts of SH-rest, and interim changes.
+    /// The ranges by kind: the base, refinements, SH parts, and interim changes.
     pub(in crate::packed) ranges: Vec<Range>,
 }
 
@@ -67,13 +67,16 @@ pub(in crate::packed) struct Index {
     pub(in crate::packed) order: Vec<Place>,
 }
 
-/// Returns the form of each layer. `levels` holds the number of refinements of each. All layers but the last have interim
-/// changes if `interim` is true.
-pub(in crate::packed) fn layer_forms(levels: &[u8], parts: usize, interim: bool) -> Vec<LayerForm> {
-    let last = levels.len().saturating_sub(1);
-    let form =
-        |(k, &levels): (usize, &u8)| LayerForm { levels: levels.into(), parts, interim: interim && k < last };
-    levels.iter().enumerate().map(form).collect()
+/// Returns the form of each layer. `refinements` holds the number of refinements of each. All layers but the last have
+/// interim changes if `interim` is true.
+pub(in crate::packed) fn layer_forms(refinements: &[u8], sh_parts: usize, interim: bool) -> Vec<LayerForm> {
+    let last = refinements.len().saturating_sub(1);
+    let form = |(k, &refinements): (usize, &u8)| LayerForm {
+        refinements: refinements.into(),
+        sh_parts,
+        interim: interim && k < last,
+    };
+    refinements.iter().enumerate().map(form).collect()
 }
 
 impl Index {
@@ -122,27 +125,27 @@ impl Index {
 
     /// Returns the cells where the base of the next layer is missing; none if `layer` has no interim changes. `there`
     /// returns whether a range is there.
-    pub(in crate::packed) fn alone(
+    pub(in crate::packed) fn uncovered(
         &self,
         layer: usize,
         there: impl Fn(&Range) -> bool,
     ) -> Vec<std::ops::Range<u64>> {
-        let mut alone: Vec<std::ops::Range<u64>> = Vec::new();
+        let mut uncovered: Vec<std::ops::Range<u64>> = Vec::new();
         if !self.layer(layer).interim {
-            return alone;
+            return uncovered;
         }
         let mut next = self.chunks.iter().filter(|chunk| chunk.layer == layer + 1).peekable();
         let mut start = 0;
         while let Some(chunk) = next.next() {
             let end = next.peek().map_or(u64::MAX, |chunk| chunk.cell);
-            match alone.last_mut() {
+            match uncovered.last_mut() {
                 _ if chunk.ranges.first().is_some_and(&there) => {}
                 Some(last) if last.end == start => last.end = end,
-                _ => alone.push(start..end),
+                _ => uncovered.push(start..end),
             }
             start = end;
         }
-        alone
+        uncovered
     }
 
     /// Returns the chunks of the next layer whose cells overlap those of chunk `c`, or may; none if the layer of `c` has no
@@ -170,7 +173,7 @@ impl Index {
     pub(in crate::packed) fn write(&self, out: &mut Vec<u8>) {
         let is_sorted = self.is_sorted();
         out.push(self.layers.len() as u8 | u8::from(is_sorted) << LAYERS_BITS);
-        out.extend(self.layers.iter().map(|layer| layer.levels as u8));
+        out.extend(self.layers.iter().map(|layer| layer.refinements as u8));
         put_number(out, self.chunks.len() as u64);
         for chunk in &self.chunks {
             out.push(chunk.layer as u8);
@@ -193,27 +196,27 @@ impl Index {
         }
     }
 
-    /// Reads the bytes that [`Self::write`] wrote for chunks with `parts` parts of SH-rest. All layers but the last have
+    /// Reads the bytes that [`Self::write`] wrote for chunks with `sh_parts` SH parts. All layers but the last have
     /// interim changes if `interim` is true.
     ///
     /// # Errors
     /// The broken rule for bytes that break a rule of docs/FORMAT.md, "Index".
     pub(in crate::packed) fn read(
         from: &mut Fields<'_>,
-        parts: usize,
+        sh_parts: usize,
         interim: bool,
     ) -> Result<Self, BrokenHead> {
         let layers = from.take("number of layers", ByteReader::u8)?;
         let (is_sorted, layers) =
             (layers >> LAYERS_BITS == 1, usize::from(layers & ((1 << LAYERS_BITS) - 1)));
         must(layers <= MAX_LAYERS, || format!("the number of layers is {layers}, above {MAX_LAYERS}"))?;
-        let levels = from.take("R", |from| from.bytes(layers))?;
-        for (layer, &levels) in levels.iter().enumerate() {
-            must(usize::from(levels) <= MAX_LEVELS, || {
-                format!("R of layer {layer} is {levels}, above {MAX_LEVELS}")
+        let refinements = from.take("R", |from| from.bytes(layers))?;
+        for (layer, &refinements) in refinements.iter().enumerate() {
+            must(usize::from(refinements) <= MAX_REFINEMENTS, || {
+                format!("R of layer {layer} is {refinements}, above {MAX_REFINEMENTS}")
             })?;
         }
-        let mut index = Self { layers: layer_forms(levels, parts, interim), ..Self::default() };
+        let mut index = Self { layers: layer_forms(refinements, sh_parts, interim), ..Self::default() };
         let (mut ranges, mut last) = (0, 0);
         // Every chunk and every range takes bytes of the index, so their numbers are bounded by its length.
         let chunks = from.take("number of chunks", ByteReader::number32)?;
@@ -291,7 +294,7 @@ impl Index {
     }
 }
 
-/// Rounds bounds outward to numbers of which only the two high bytes are not 0.
+/// Rounds bounds outward to numbers whose two low bytes are 0.
 fn widened([least, most]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
     // `near` rounds towards zero, and `far` away from it.
     let near = |x: f32| f32::from_bits(x.to_bits() >> 16 << 16);

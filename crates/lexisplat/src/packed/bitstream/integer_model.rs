@@ -4,7 +4,7 @@
 //! every language computes the same ones. Floats are only used to make values of decoded integers.
 
 use crate::packed::bitstream::broken::BrokenHead;
-use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, TARGETS};
+use crate::packed::bitstream::parameters::{ColourAndShape, LAST_CLASS, Parameters, TARGETS};
 use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, Bits, SignedBitModel};
 use crate::packed::entropy::lanes::{LANES, Lanes, each};
 
@@ -134,12 +134,12 @@ impl Integers {
         let octaves = |x: f32| libm::log2(f64::from(x));
         let slopes = |row: [f32; SLOPES]| -> [i16; SLOPES] {
             std::array::from_fn(|k| match k {
-                0 => constant(f64::from(row[0]) + octaves(p.base[1])),
+                0 => constant(f64::from(row[0]) + octaves(p.base.shape)),
                 _ => coefficient(f64::from(row[k])),
             })
         };
         let [dc, _, opacity, s0, s1, s2] = p.factors.map(f64::from);
-        let [colour, shape] = p.base.map(f64::from);
+        let ColourAndShape { colour, shape } = p.base.map(f64::from);
         let steps = [shape * s0, shape * s1, shape * s2, shape * opacity, colour * dc / dc_unit];
         // A coefficient whose feature has another unit than the target is divided by the unit of the target.
         let unit = |t: usize| if t < 4 { 1.0 } else { dc_unit };

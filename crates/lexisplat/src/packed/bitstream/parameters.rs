@@ -22,8 +22,21 @@ const STEP_FEATURES: usize = 4;
 /// Number of the coarsest class of steps.
 pub(in crate::packed) const LAST_CLASS: u8 = 15;
 
-/// Parts of an octave. The step with which a dictionary is learned is rounded to a part, which changes it by at most 9 %.
+/// The step with which a dictionary is learned is rounded to a quarter of an octave, which changes it by at most 9 %.
 const PER_OCTAVE: f64 = 4.0;
+
+/// A value for colour and a value for shape: a class, or the steps of class 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub(in crate::packed) struct ColourAndShape<T> {
+    pub(in crate::packed) colour: T,
+    pub(in crate::packed) shape: T,
+}
+
+impl<T> ColourAndShape<T> {
+    pub(in crate::packed) fn map<U>(self, f: impl Fn(T) -> U) -> ColourAndShape<U> {
+        ColourAndShape { colour: f(self.colour), shape: f(self.shape) }
+    }
+}
 
 /// Steps and predictors of a file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -32,8 +45,8 @@ pub(in crate::packed) struct Parameters {
     pub(in crate::packed) origin: Vec3,
     /// Side of a cell of the grid, in world units.
     pub(in crate::packed) cell: f32,
-    /// Steps of class 0 for colour and for shape. The step doubles from class to class.
-    pub(in crate::packed) base: [f32; 2],
+    /// Steps of class 0. The step doubles from class to class.
+    pub(in crate::packed) base: ColourAndShape<f32>,
     /// Factors on the steps of base colour, SH values, opacity and the three scales.
     pub(in crate::packed) factors: [f32; 6],
     /// Step of all SH values if a tolerance is promised; otherwise 0.
@@ -54,7 +67,7 @@ pub(in crate::packed) struct Parameters {
 impl Parameters {
     /// Returns whether all values are finite, and steps and their factors above 0.
     pub(in crate::packed) fn are_usable(&self) -> bool {
-        let steps = [&[self.cell], &self.base[..], &self.factors];
+        let steps = [&[self.cell, self.base.colour, self.base.shape][..], &self.factors];
         let others = [
             &self.origin[..],
             &[self.promised],
@@ -73,7 +86,7 @@ impl Parameters {
 
     fn colour_step(&self, class: u8) -> f32 {
         // The factor is 2 to the power of the class, which is at most 15.
-        self.base[0] * f32::from_bits((127 + u32::from(class)) << 23)
+        self.base.colour * f32::from_bits((127 + u32::from(class)) << 23)
     }
 
     /// Returns the step of the three coordinates of the base colour at a colour class.
@@ -91,26 +104,26 @@ impl Parameters {
         self.colour_step(0) * self.factors[1]
     }
 
-    /// Returns the parameters with which a dictionary is learned. The step of SH values is rounded to parts of an octave;
-    /// see [`PER_OCTAVE`]. A promised step stays as it is. Learning depends on the last bits of its rows, and these differ
+    /// Returns the parameters with which a dictionary is learned. The step of SH values is rounded; see
+    /// [`PER_OCTAVE`]. A promised step stays as it is. Learning depends on the last bits of its rows, and these differ
     /// if a scene is in other units or if a step differs slightly.
     pub(in crate::packed) fn for_learning(&self) -> Self {
         let mut other = self.clone();
         let octaves = libm::rint(libm::log2(f64::from(self.free_value_step())) * PER_OCTAVE) / PER_OCTAVE;
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let step = libm::exp2(octaves) as f32;
-        (other.base[0], other.factors[1]) = (step, 1.0);
+        (other.base.colour, other.factors[1]) = (step, 1.0);
         other
     }
 
     /// Returns the steps of turns about each of the Gaussian's axes, in radians, at shape class 0.
     pub(in crate::packed) fn rotation_steps(&self, scales: Vec3) -> Vec3 {
-        self.rotation.map(|row| self.base[1] * exp2(linear(row, scales)))
+        self.rotation.map(|row| self.base.shape * exp2(linear(row, scales)))
     }
 
     /// Returns the steps of the position along each of the Gaussian's axes, in world units, at shape class 0.
     pub(in crate::packed) fn position_steps(&self, scales: Vec3) -> Vec3 {
-        self.position.map(|row| self.base[1] * exp2(linear(row, scales)))
+        self.position.map(|row| self.base.shape * exp2(linear(row, scales)))
     }
 
     /// Returns the coordinates of a base colour along the axes.
@@ -154,7 +167,7 @@ mod tests {
     #[test]
     fn a_hair_in_a_step_changes_nothing_that_is_learned() {
         let of = |base: f32| Parameters {
-            base: [base, 1.0],
+            base: ColourAndShape { colour: base, shape: 1.0 },
             factors: [1.0, 1.3, 1.0, 1.0, 1.0, 1.0],
             ..Parameters::default()
         };

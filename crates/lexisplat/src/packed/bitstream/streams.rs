@@ -1,11 +1,11 @@
 //! The streams of symbols. A stream has contexts, and a context has a table of probabilities.
 
-use super::levels::MAX_LEVELS;
+use super::coarseness::MAX_REFINEMENTS;
 
 /// Number of contexts of a stream.
 pub(in crate::packed) const CONTEXTS: usize = 24;
-/// Number of parts into which nonzeros are split by their size, largest first.
-pub(in crate::packed) const REST_PARTS: usize = 3;
+/// Largest number of SH parts: nonzeros are split by their size, largest first.
+pub(in crate::packed) const SH_PARTS: usize = 3;
 
 /// Defines [`Stream`] from the names of the streams and of the attributes that they belong to.
 macro_rules! streams {
@@ -51,7 +51,7 @@ streams! { 30:
     /// Refinements of positions and of base colours.
     FinePosition => "position",
     FineDc => "dc",
-    /// Numbers of nonzeros, atoms and values of each part.
+    /// Numbers of nonzeros, atoms and values of each SH part.
     Count0 => "codes.counts",
     Count1 => "codes.counts",
     Count2 => "codes.counts",
@@ -77,9 +77,9 @@ impl Stream {
         Self::ALL.into_iter().map(|stream| (format!("{stream:?}"), stream.attribute()))
     }
 
-    pub(in crate::packed) const COUNTS: [Self; REST_PARTS] = [Self::Count0, Self::Count1, Self::Count2];
-    pub(in crate::packed) const ATOMS: [Self; REST_PARTS] = [Self::Atom0, Self::Atom1, Self::Atom2];
-    pub(in crate::packed) const VALUES: [Self; REST_PARTS] = [Self::Value0, Self::Value1, Self::Value2];
+    pub(in crate::packed) const COUNTS: [Self; SH_PARTS] = [Self::Count0, Self::Count1, Self::Count2];
+    pub(in crate::packed) const ATOMS: [Self; SH_PARTS] = [Self::Atom0, Self::Atom1, Self::Atom2];
+    pub(in crate::packed) const VALUES: [Self; SH_PARTS] = [Self::Value0, Self::Value1, Self::Value2];
 }
 
 impl Stream {
@@ -98,10 +98,10 @@ impl Stream {
 /// tables.
 const OF_GEOMETRY: usize = Stream::Count0 as usize;
 /// Number of different numbers of missing refinements.
-const BY_LEVELS: usize = MAX_LEVELS + 1;
+const BY_MISSING: usize = MAX_REFINEMENTS + 1;
 /// Number of sets of contexts.
 pub(in crate::packed) const SLOTS: usize =
-    BY_LEVELS * OF_GEOMETRY + Stream::Dictionary as usize - OF_GEOMETRY;
+    BY_MISSING * OF_GEOMETRY + Stream::Dictionary as usize - OF_GEOMETRY;
 
 /// A set of contexts: the contexts of a stream at one number of missing refinements.
 #[derive(Debug, Clone, Copy)]
@@ -131,12 +131,12 @@ impl Slot {
 }
 
 impl Stream {
-    /// Returns the set of contexts of the stream, if `levels` refinements are missing.
+    /// Returns the set of contexts of the stream, if `missing` refinements are missing.
     #[inline(always)]
-    pub(in crate::packed) fn at(self, levels: usize) -> Slot {
+    pub(in crate::packed) fn at(self, missing: usize) -> Slot {
         let number = match self as usize {
-            stream if stream < OF_GEOMETRY => levels.min(MAX_LEVELS) * OF_GEOMETRY + stream,
-            stream => (BY_LEVELS - 1) * OF_GEOMETRY + stream,
+            stream if stream < OF_GEOMETRY => missing.min(MAX_REFINEMENTS) * OF_GEOMETRY + stream,
+            stream => (BY_MISSING - 1) * OF_GEOMETRY + stream,
         };
         Slot { stream: self, number }
     }
@@ -145,7 +145,7 @@ impl Stream {
 /// Returns the stream of a context, by its number among all contexts.
 pub(in crate::packed) fn stream_of(context: usize) -> Stream {
     let number = context / CONTEXTS;
-    let shared = BY_LEVELS * OF_GEOMETRY;
+    let shared = BY_MISSING * OF_GEOMETRY;
     let stream = if number < shared { number % OF_GEOMETRY } else { number - shared + OF_GEOMETRY };
     Stream::ALL.get(stream).copied().unwrap_or(Stream::Dictionary)
 }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::bytes::{ByteReader, Fields};
 use super::*;
-use crate::packed::bitstream::parameters::Parameters;
+use crate::packed::bitstream::parameters::{ColourAndShape, Parameters};
 use crate::scene::sh::ShDegree;
 
 /// Most Gaussians of a chunk.
@@ -14,37 +14,40 @@ const MOST: usize = 1 << 16;
 
 /// Indexes of chunks with any layers and numbers of Gaussians. Ranges are long enough, and in an order that an index may
 /// have.
-fn indexes(parts: usize, interim: bool) -> impl Strategy<Value = Index> {
-    let levels = prop::collection::vec(0_u8..=2, 1..4);
+fn indexes(sh_parts: usize, interim: bool) -> impl Strategy<Value = Index> {
+    let refinements = prop::collection::vec(0_u8..=2, 1..4);
     let gaussians = prop_oneof![1..300_usize, Just(1), Just(MOST)];
     let bound = -1e6..1e6_f32;
     let chunk = (any::<u8>(), gaussians, any::<u64>(), prop::array::uniform6(bound), any::<u32>());
-    (levels, prop::collection::vec(chunk, 0..6), any::<u64>()).prop_map(move |(levels, chunks, seed)| {
-        let mut index = Index { layers: layer_forms(&levels, parts, interim), ..Index::default() };
-        for (layer, gaussians, cell, [a, b, c, d, e, f], number) in chunks {
-            let layer = usize::from(layer) % levels.len();
-            let count = index.layer(layer).ranges();
-            let range = |k: u32| {
-                let length = if k == 0 { (3 * gaussians as u32).div_ceil(8) } else { number % 100 };
-                Range { start: 0, length, checksum: number.wrapping_mul(k), integers: number ^ k }
+    (refinements, prop::collection::vec(chunk, 0..6), any::<u64>()).prop_map(
+        move |(refinements, chunks, seed)| {
+            let mut index =
+                Index { layers: layer_forms(&refinements, sh_parts, interim), ..Index::default() };
+            for (layer, gaussians, cell, [a, b, c, d, e, f], number) in chunks {
+                let layer = usize::from(layer) % refinements.len();
+                let count = index.layer(layer).ranges();
+                let range = |k: u32| {
+                    let length = if k == 0 { (3 * gaussians as u32).div_ceil(8) } else { number % 100 };
+                    Range { start: 0, length, checksum: number.wrapping_mul(k), integers: number ^ k }
+                };
+                let ranges = (0..count as u32).map(range).collect();
+                let bounds = [[a, b, c], [d, e, f]];
+                index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges });
+            }
+            index.chunks.sort_by_key(|chunk| (chunk.layer, chunk.cell));
+            let all = index.chunks.iter().zip(0_u32..);
+            let place = |(chunk, number): (&Chunk, u32)| {
+                (0..chunk.ranges.len() as u8).map(move |kind| Place { chunk: number, kind })
             };
-            let ranges = (0..count as u32).map(range).collect();
-            let bounds = [[a, b, c], [d, e, f]];
-            index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges });
-        }
-        index.chunks.sort_by_key(|chunk| (chunk.layer, chunk.cell));
-        let all = index.chunks.iter().zip(0_u32..);
-        let place = |(chunk, number): (&Chunk, u32)| {
-            (0..chunk.ranges.len() as u8).map(move |kind| Place { chunk: number, kind })
-        };
-        index.order = all.flat_map(place).collect();
-        // Any order is allowed in which bases come first.
-        index
-            .order
-            .sort_by_key(|p| (p.kind > 0, u64::from(p.chunk * 8 + u32::from(p.kind)).wrapping_mul(seed | 1)));
-        index.place().unwrap();
-        index
-    })
+            index.order = all.flat_map(place).collect();
+            // Any order is allowed in which bases come first.
+            index.order.sort_by_key(|p| {
+                (p.kind > 0, u64::from(p.chunk * 8 + u32::from(p.kind)).wrapping_mul(seed | 1))
+            });
+            index.place().unwrap();
+            index
+        },
+    )
 }
 
 fn written(index: &Index) -> Vec<u8> {
@@ -54,21 +57,21 @@ fn written(index: &Index) -> Vec<u8> {
 }
 
 /// Reads the index that `bytes` are. `None` if bytes are left over.
-fn read(bytes: &[u8], parts: usize, interim: bool) -> Option<Index> {
+fn read(bytes: &[u8], sh_parts: usize, interim: bool) -> Option<Index> {
     let mut from = Fields(ByteReader(bytes));
-    Index::read(&mut from, parts, interim).ok().filter(|_| from.0.0.is_empty())
+    Index::read(&mut from, sh_parts, interim).ok().filter(|_| from.0.0.is_empty())
 }
 
 proptest! {
     #[test]
     fn indexes_come_back(
-        (parts, interim, index) in (0_usize..=3, any::<bool>())
-            .prop_flat_map(|(parts, interim)| (Just(parts), Just(interim), indexes(parts, interim))),
+        (sh_parts, interim, index) in (0_usize..=3, any::<bool>())
+            .prop_flat_map(|(sh_parts, interim)| (Just(sh_parts), Just(interim), indexes(sh_parts, interim))),
     ) {
         let bytes = written(&index);
-        prop_assert!(read(&bytes, parts, interim).as_ref() == Some(&index));
+        prop_assert!(read(&bytes, sh_parts, interim).as_ref() == Some(&index));
         for length in 0..bytes.len() {
-            prop_assert!(read(&bytes[..length], parts, interim).is_none(), "{length} of {}", bytes.len());
+            prop_assert!(read(&bytes[..length], sh_parts, interim).is_none(), "{length} of {}", bytes.len());
         }
         let gaussians: usize = index.chunks.iter().map(|chunk| chunk.gaussians).sum();
         prop_assert_eq!(index.gaussians(), gaussians);
@@ -119,11 +122,11 @@ fn two_layers() -> Index {
 #[test]
 fn indexes_that_cannot_be_are_refused() {
     assert_eq!(read(&written(&two_layers()), 2, true), Some(two_layers()));
-    for (parts, interim) in [(1, true), (3, true), (2, false)] {
-        assert!(read(&written(&two_layers()), parts, interim).is_none(), "{parts} {interim}");
+    for (sh_parts, interim) in [(1, true), (3, true), (2, false)] {
+        assert!(read(&written(&two_layers()), sh_parts, interim).is_none(), "{sh_parts} {interim}");
     }
     let changes: [fn(&mut Index); 11] = [
-        |i| i.layers[0].levels = 3,
+        |i| i.layers[0].refinements = 3,
         |i| i.layers.extend([LayerForm::default(); 7]),
         |i| i.layers.truncate(1),
         |i| i.chunks[0].gaussians = 0,
@@ -147,7 +150,7 @@ fn head(dim: usize, points: usize, index: Index) -> Head {
     let mut p = Parameters {
         origin: [1.0, -2.0, 3.5],
         cell: 0.25,
-        base: [0.01, 0.002],
+        base: ColourAndShape { colour: 0.01, shape: 0.002 },
         factors: [1.5, 2.5, 0.5, 1.0, 1.1, 1.2],
         dc_mean: [0.1, 0.2, 0.3],
         dc_axes: rounded_axes(&[[1.0, 0.0, 0.0], [0.0, 0.6, 0.8], [0.0, -0.8, 0.6]]),
@@ -163,7 +166,7 @@ fn head(dim: usize, points: usize, index: Index) -> Head {
     let points: Vec<[f32; 3]> = (0..points).map(|k| [k as f32, 1.5, -0.25 * k as f32]).collect();
     let degree = (0..=4).filter_map(|l| ShDegree::new(l).ok()).find(|degree| degree.rest() == dim).unwrap();
     let atoms = WholeAtoms::new(degree, &vec![0.5; 300 * dim], 4, false);
-    let mut head = Head::new(&p, 77.0, rest, &atoms, MeanView::new(&points));
+    let mut head = Head::new(&p, 77.0, rest, &atoms, PointsOfView::new(&points));
     if !index.chunks.is_empty() && dim > 0 {
         head = head.with_interim([0.4, 0.5, 0.6]);
     }
@@ -230,12 +233,12 @@ fn heads_with_numbers_no_decoder_takes_are_refused() {
         |h| h.frame.cell = 0.0,
         |h| h.frame.origin[1] = f32::NAN,
         |h| h.value_step = 0.0,
-        |h| h.mean_view.softening = 0.0,
-        |h| h.mean_view.softening = 1e-19,
-        |h| h.mean_view.softening = 1e19,
+        |h| h.points_of_view.softening = 0.0,
+        |h| h.points_of_view.softening = 1e-19,
+        |h| h.points_of_view.softening = 1e19,
         |h| h.dc_turn = [0; 4],
-        |h| h.mean_view.points = vec![[0.0; 3]; 16],
-        |h| h.mean_view.points[7] = [1.0, f32::INFINITY, 0.0],
+        |h| h.points_of_view.points = vec![[0.0; 3]; 16],
+        |h| h.points_of_view.points[7] = [1.0, f32::INFINITY, 0.0],
         |h| h.interim = Some([1, 0, 1]),
         |h| h.interim = Some([1, 1, 1 << 27]),
     ];

@@ -6,8 +6,8 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use super::chunk::{LayerForm, starts};
-use super::fill_in::interim;
 use super::geometry_syntax::{GeometrySyntax, Group};
+use super::interim::interim;
 use super::parameters::CHANGES;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest};
@@ -16,7 +16,7 @@ use super::{Head, lanes};
 use crate::lexi::LexiReader;
 use crate::packed::entropy::lanes::{LANES, Lanes, has};
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
-use crate::packed::entropy::rans_encoder::MOST_BITS;
+use crate::packed::entropy::rans_state::MOST_BITS;
 use crate::packed::entropy::symbols::{Symbols, low_bits};
 use crate::packed::entropy::tables::{Lookup, Tables};
 use crate::support::limits::Limits;
@@ -30,7 +30,7 @@ enum Step {
 
 /// A decoder that records the steps of its first lane.
 struct Traced<'a> {
-    player: SymbolDecoder<'a>,
+    decoder: SymbolDecoder<'a>,
     steps: Vec<Step>,
 }
 
@@ -42,9 +42,9 @@ impl Symbols for Traced<'_> {
         set: u32,
         value: impl Fn(usize) -> u32,
     ) -> Lanes<u32> {
-        let out = self.player.symbols(slot, context, set, value);
+        let out = self.decoder.symbols(slot, context, set, value);
         if has(set, 0) {
-            let state = self.player.states[0];
+            let state = self.decoder.states[0];
             self.steps.push(Step::Symbol { stream: slot.stream, context: context[0], symbol: out[0], state });
         }
         out
@@ -57,10 +57,10 @@ impl Symbols for Traced<'_> {
             if taken == [0; LANES] {
                 continue;
             }
-            let values = self.player.bits(slot, taken, set, |_| 0);
+            let values = self.decoder.bits(slot, taken, set, |_| 0);
             out.iter_mut().zip(values).for_each(|(out, value)| *out |= value << (MOST_BITS * piece));
             if has(set, 0) && taken[0] > 0 {
-                let state = self.player.states[0];
+                let state = self.decoder.states[0];
                 self.steps.push(Step::Bits { count: taken[0], value: values[0], state });
             }
         }
@@ -83,13 +83,13 @@ fn put(out: &mut String, range: usize, gaussian: &str, steps: &[Step]) {
     }
 }
 
-/// Splits the steps of a block of a part by Gaussian. Steps of signs have the number of the first Gaussian that they are
+/// Splits the steps of a block of an SH part by Gaussian. Steps of signs have the number of the first Gaussian that they are
 /// for. `counts` holds the numbers of nonzeros, and `exact` says which Gaussians have exact rows of `dim` numbers.
-fn of_part(
+fn by_gaussian(
     steps: &[Step],
     counts: &[usize],
     exact: &[bool],
-    part: usize,
+    sh_part: usize,
     dim: usize,
 ) -> Vec<(String, Vec<Step>)> {
     let mut steps = steps.iter().copied();
@@ -106,7 +106,7 @@ fn of_part(
         (all, stream)
     };
     let mut out = Vec::new();
-    for i in (0..counts.len()).filter(|&i| part == 0 || !exact[i]) {
+    for i in (0..counts.len()).filter(|&i| sh_part == 0 || !exact[i]) {
         out.push((i.to_string(), symbol(true).0));
     }
     let mut owners = Vec::new();
@@ -126,7 +126,7 @@ fn of_part(
         assert!(matches!(signs, Step::Bits { count, .. } if count as usize == owners.len()));
         out.push((format!("- {}", owners[0]), vec![signs]));
     }
-    if part == 0 {
+    if sh_part == 0 {
         for i in (0..counts.len()).filter(|&i| exact[i]) {
             out.push((i.to_string(), steps.by_ref().take(2 * dim).collect()));
         }
@@ -153,12 +153,12 @@ fn trace(name: &str, shown: usize) -> String {
         .iter()
         .map(|range| {
             let bytes = &packed.data()[range.start as usize..][..range.length as usize];
-            Traced { player: SymbolDecoder::new(&lookup, bytes, lanes, false).unwrap(), steps: Vec::new() }
+            Traced { decoder: SymbolDecoder::new(&lookup, bytes, lanes, false).unwrap(), steps: Vec::new() }
         })
         .collect();
-    let levels = layer.levels;
+    let refinements = layer.refinements;
     let mut out = vec![String::new(); layer.ranges()];
-    let mut walk = GeometrySyntax::new(&form.steering, levels);
+    let mut walk = GeometrySyntax::new(&form.steering, refinements);
     let mut rest = Rest::default();
     let count = BLOCK.min(starts[1]);
     for i in 0..count {
@@ -166,8 +166,8 @@ fn trace(name: &str, shown: usize) -> String {
         let set = (0..lanes).map(own).sum();
         let mut group = Group::default();
         walk.base(&mut ranges[0], set, None, &mut group).unwrap();
-        for k in 1..=levels {
-            refine(&mut ranges[k], set, &mut group, levels + 1 - k).unwrap();
+        for k in 1..=refinements {
+            refine(&mut ranges[k], set, &mut group, refinements + 1 - k).unwrap();
         }
         if layer.interim {
             interim(&mut ranges[layer.interim_range()], set, &mut group, &[[0; LANES]; CHANGES]);
@@ -182,22 +182,22 @@ fn trace(name: &str, shown: usize) -> String {
     }
     let dim = form.rest.dim;
     let mut exact = vec![false; count];
-    for part in 0..layer.parts {
-        let k = 1 + levels + part;
-        rest.part(&mut ranges[k], None, &form.rest, part).unwrap();
+    for sh_part in 0..layer.sh_parts {
+        let k = 1 + refinements + sh_part;
+        rest.sh_part(&mut ranges[k], None, &form.rest, sh_part).unwrap();
         let steps = std::mem::take(&mut ranges[k].steps);
         let mut cursor = Cursor::default();
         let mut counts = Vec::new();
         for i in 0..count {
-            match rest.coded(&form.rest, part, i, 0, &mut cursor) {
+            match rest.coded(&form.rest, sh_part, i, 0, &mut cursor) {
                 Coded::Exact(_) => {
                     exact[i] = true;
                     counts.push(0);
                 }
-                Coded::Code(_, count) => counts.push(count),
+                Coded::Code { count, .. } => counts.push(count),
             }
         }
-        for (gaussian, steps) in of_part(&steps, &counts, &exact, part, dim) {
+        for (gaussian, steps) in by_gaussian(&steps, &counts, &exact, sh_part, dim) {
             let first = gaussian.trim_start_matches("- ");
             if first.parse::<usize>().unwrap() < shown {
                 put(&mut out[k], k, if gaussian.starts_with('-') { "-" } else { first }, &steps);

@@ -101,7 +101,7 @@ fn sine_cosine(x: f32) -> (f32, f32) {
     ((cosine + sine) * root, (cosine - sine) * root)
 }
 
-/// Returns the middle of part `code` of the range from 0 to 1, if that is cut into `2^bits` parts.
+/// Returns the middle of piece `code` of the interval from 0 to 1, if it is cut into `2^bits` equal pieces.
 #[inline(always)]
 fn share(code: u32, bits: u32) -> f32 {
     (code.cast_signed() as f32 + 0.5) * f32::from_bits((127 - bits) << 23)

@@ -47,7 +47,7 @@ impl<'d> Data<'d> {
 /// Options of decoding a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DecodeOptions {
-    /// Largest number of parts of SH-rest that are decoded.
+    /// Largest number of SH parts that are decoded.
     pub(crate) sh_parts: usize,
     /// Whether the checksums of integers are verified.
     pub(crate) verify: bool,

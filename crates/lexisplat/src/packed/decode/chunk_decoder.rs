@@ -5,7 +5,7 @@ use crate::packed::bitstream::broken::{Broken, BrokenHead, must};
 use crate::packed::bitstream::chunk::{InRange, Want};
 use crate::packed::bitstream::head::Head;
 use crate::packed::bitstream::index::{Chunk, Index};
-use crate::packed::bitstream::mean_view::SeenAtoms;
+use crate::packed::bitstream::points_of_view::SeenAtoms;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::bitstream::streams::Stream;
 use crate::packed::decode::available_ranges::{Data, DecodeOptions};
@@ -46,10 +46,10 @@ impl BitstreamDecoder {
         let lookup = Lookup::new(&tables);
         let (dictionary, dictionary_bits) = dictionary(&head, packed.degree).map_err(bad)?;
         let unpacker = Unpacker {
-            seen_atoms: SeenAtoms::new(&head.mean_view, &dictionary),
+            seen_atoms: SeenAtoms::new(&head.points_of_view, &dictionary),
             form: head.form(),
             frame: head.frame.clone(),
-            mean_view: head.mean_view.clone(),
+            points_of_view: head.points_of_view.clone(),
             lookup,
             dictionary,
         };
@@ -88,11 +88,10 @@ impl BitstreamDecoder {
         let index = &self.head.index;
         let chunk = index.chunks.get(c).ok_or_else(|| damaged("is not in the index"))?;
         let form = index.layer(chunk.layer);
-        let alone = index.alone(chunk.layer, |range| data.came(range.start, range.length));
-        let is_wanted =
-            |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(part) if part >= options.sh_parts);
+        let uncovered = index.uncovered(chunk.layer, |range| data.came(range.start, range.length));
+        let is_wanted = |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(k) if k >= options.sh_parts);
         let mut ranges = self.checked(data, c, chunk, is_wanted)?;
-        if alone.is_empty()
+        if uncovered.is_empty()
             && !count_bits
             && !options.verify
             && let Some(interim) = ranges.get_mut(form.interim_range())
@@ -100,7 +99,7 @@ impl BitstreamDecoder {
             *interim = None;
         }
         let want = Want { sums: options.verify, bits: count_bits };
-        let piece = self.unpacker.chunk(form, chunk.cell, &alone, &ranges, want, place, budget);
+        let piece = self.unpacker.chunk(form, chunk.cell, &uncovered, &ranges, want, place, budget);
         let (mut piece, sums) = piece.map_err(|refusal| match refusal {
             Refusal::Damaged(InRange { range, broken: Broken(rule) }) => {
                 let kind = RangeKind::of(form, range);
@@ -130,7 +129,7 @@ impl BitstreamDecoder {
     }
 
     /// Returns the ranges of a chunk that are there and for which `is_wanted` is true, and verifies their checksums.
-    /// Refinements after a missing refinement are left out, and so are parts of SH-rest after a missing part.
+    /// Refinements after a missing refinement are left out, and so are SH parts after a missing one.
     fn checked<'d>(
         &self,
         data: Data<'d>,

@@ -6,11 +6,12 @@ use half::f16;
 
 use crate::packed::bitstream::broken::Broken;
 use crate::packed::bitstream::chunk::{Form, InRange, LayerForm, Sink, Want, starts};
+use crate::packed::bitstream::coarseness::Refinements;
 use crate::packed::bitstream::drawn::{Drawn, Frame};
 use crate::packed::bitstream::geometry_syntax::Group;
 use crate::packed::bitstream::halves::halved;
-use crate::packed::bitstream::mean_view::{MOST, MeanView, SeenAtoms, seen_row};
 use crate::packed::bitstream::parameters::LAST_CLASS;
+use crate::packed::bitstream::points_of_view::{MOST, PointsOfView, SeenAtoms, seen_row};
 use crate::packed::bitstream::sh_codes::{BLOCK, Coded, Cursor, Nonzero, Rest};
 use crate::packed::decode::place::{Piece, Place, indices};
 use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
@@ -25,7 +26,7 @@ use crate::support::simd::Simd;
 pub(in crate::packed) struct Unpacker {
     pub(in crate::packed) form: Form,
     pub(in crate::packed) frame: Frame,
-    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) points_of_view: PointsOfView,
     pub(in crate::packed) lookup: Lookup,
     pub(in crate::packed) dictionary: Dictionary,
     pub(in crate::packed) seen_atoms: SeenAtoms,
@@ -33,7 +34,7 @@ pub(in crate::packed) struct Unpacker {
 
 impl Unpacker {
     /// Decodes a chunk of `layer` into `place`, from the ranges that are there. `cell` is the cell of its first Gaussian.
-    /// Gaussians in the cells `alone` get interim changes. Escapes are numbered from the start of the chunk. `budget`
+    /// Gaussians in the cells `uncovered` get interim changes. Escapes are numbered from the start of the chunk. `budget`
     /// already holds everything but the codes, which are added to it. Returns the codes, and the checksums of integers if
     /// they are wanted.
     #[expect(clippy::too_many_arguments, reason = "what is decoded, from what and where to")]
@@ -41,14 +42,14 @@ impl Unpacker {
         &self,
         layer: LayerForm,
         cell: u64,
-        alone: &[Range<u64>],
+        uncovered: &[Range<u64>],
         ranges: &[Option<&[u8]>],
         want: Want,
         place: &mut Place<'_>,
         budget: &MemoryBudget<'_>,
     ) -> Result<(Piece, Vec<u32>), Refusal> {
         // Registers of 512 bits were measured to be 5 to 10 % slower.
-        Simd::current().narrow().run(Job { with: self, layer, cell, alone, ranges, want, place, budget })
+        Simd::current().narrow().run(Job { with: self, layer, cell, uncovered, ranges, want, place, budget })
     }
 }
 
@@ -64,7 +65,7 @@ struct Job<'j, 'p, 'r> {
     with: &'j Unpacker,
     layer: LayerForm,
     cell: u64,
-    alone: &'j [Range<u64>],
+    uncovered: &'j [Range<u64>],
     ranges: &'j [Option<&'r [u8]>],
     want: Want,
     place: &'j mut Place<'p>,
@@ -85,16 +86,16 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let Self { with, layer, cell, alone, ranges, want, place, budget } = self;
+        let Self { with, layer, cell, uncovered, ranges, want, place, budget } = self;
         let n = place.counts.len();
         let starts = starts(n, crate::packed::bitstream::chunk::lanes(n));
         let blank = [[0.0; LANES]; 3];
-        let positions = if with.mean_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
+        let positions = if with.points_of_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
         let mut out = Out {
             with,
             place,
             cell,
-            alone,
+            uncovered,
             starts,
             nonzeros: Lanes::default(),
             escapes: Lanes::default(),
@@ -121,7 +122,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         // Large values are infinite in f16, and base colours may leave f32 when the sums of codes are subtracted.
         let refused = |range: usize, rule| Err(Refusal::Damaged(InRange { range, broken: Broken(rule) }));
         if !values.iter().fold(true, |good, v| good & v.is_finite()) {
-            return refused(1 + layer.levels, "has an SH value that is infinite in f16");
+            return refused(1 + layer.refinements, "has an SH value that is infinite in f16");
         }
         if !place.dc.as_flattened().iter().fold(true, |good, v| good & v.is_finite()) {
             return refused(0, "has a base colour that is not finite with SH-rest taken away");
@@ -140,7 +141,7 @@ struct Out<'j, 'p> {
     /// The cell of the first Gaussian.
     cell: u64,
     /// Cells around which the next layer is missing.
-    alone: &'j [Range<u64>],
+    uncovered: &'j [Range<u64>],
     /// Index of the first Gaussian of each lane.
     starts: [usize; LANES + 1],
     /// The nonzeros of each lane. Those of one Gaussian are in ascending order of atoms.
@@ -162,15 +163,15 @@ impl Sink for Out<'_, '_> {
         in_block: usize,
         set: u32,
         group: &Group,
-        levels: [usize; 2],
+        refinements: Refinements,
     ) -> Result<(), Broken> {
         if number == 0 && group.number[0] != self.cell {
             return Err(Broken("begins with another cell than the index says"));
         }
-        let is_alone =
-            |l: usize| has(set, l) && self.alone.iter().any(|cells| cells.contains(&group.number[l]));
-        let alone = if self.alone.is_empty() { [false; LANES] } else { each(is_alone) };
-        let drawn = Drawn::new(&self.with.frame, group, levels, &alone);
+        let is_interim =
+            |l: usize| has(set, l) && self.uncovered.iter().any(|cells| cells.contains(&group.number[l]));
+        let interim = if self.uncovered.is_empty() { [false; LANES] } else { each(is_interim) };
+        let drawn = Drawn::new(&self.with.frame, group, refinements, &interim);
         if let Some(position) = self.positions.get_mut(in_block) {
             *position = drawn.position;
         }
@@ -199,9 +200,9 @@ impl Sink for Out<'_, '_> {
         let mut weights = [[0.0; LANES]; MOST];
         for k in 0..rest.len() {
             let (set, colours) = rest.of(k);
-            let has_view = match self.positions.get(k) {
+            let has_points = match self.positions.get(k) {
                 Some(position) => {
-                    self.with.mean_view.lanes(degree, position, &mut weights);
+                    self.with.points_of_view.lanes(degree, position, &mut weights);
                     true
                 }
                 None => false,
@@ -212,16 +213,16 @@ impl Sink for Out<'_, '_> {
                 let step = self.with.frame.value_steps[(colours[l] & u32::from(LAST_CLASS)) as usize];
                 let first = nonzeros.len();
                 let mut exact = None;
-                for part in 0..form.least.len() {
-                    match rest.coded(form, part, k, l, &mut cursors[l]) {
+                for sh_part in 0..form.least.len() {
+                    match rest.coded(form, sh_part, k, l, &mut cursors[l]) {
                         Coded::Exact(row) => {
                             self.escapes[l].gaussians.push(u32::try_from(i).map_err(|_| NO_PLACE)?);
                             self.escapes[l].rows.extend_from_slice(row);
                             exact = Some(row);
                         }
-                        Coded::Code(_, 0) => {}
-                        Coded::Code(from, count) => {
-                            for (atom, value) in rest.nonzeros(part, from, count, l) {
+                        Coded::Code { count: 0, .. } => {}
+                        Coded::Code { first: from, count } => {
+                            for (atom, value) in rest.nonzeros(sh_part, from, count, l) {
                                 let added = Nonzero { atom, value: halved(value as f32 * step) };
                                 let mut at = nonzeros.len();
                                 nonzeros.push(added);
@@ -239,7 +240,7 @@ impl Sink for Out<'_, '_> {
                 let count = u8::try_from(code.len())
                     .map_err(|_| Broken("has a Gaussian with more nonzeros than coefficients"))?;
                 *self.place.counts.get_mut(i).ok_or(NO_PLACE)? = count;
-                if !has_view {
+                if !has_points {
                     continue;
                 }
                 let added = match exact {

@@ -27,7 +27,7 @@ pub struct LayerOutline {
     pub chunks: Range<usize>,
     /// Number of refinements of each of its chunks.
     pub levels: usize,
-    /// Number of parts of SH-rest of each of its chunks.
+    /// Number of SH parts of each of its chunks.
     pub sh_parts: usize,
 }
 
@@ -82,7 +82,8 @@ pub enum RangeKind {
     Base,
     /// A refinement of the base, by its number from 0. It needs all refinements of lower numbers.
     Refinement(usize),
-    /// A part of SH-rest, by its number from 0. Part 0 has the largest values. A part needs all parts of lower numbers.
+    /// An SH part: the nonzeros of some sizes, by its number from 0. Part 0 has the largest values. A part needs all
+    /// parts of lower numbers.
     Sh(usize),
     /// Interim changes: changes of Gaussians while those of the next layer are missing.
     Interim,
@@ -93,8 +94,8 @@ impl RangeKind {
     pub(in crate::packed) fn of(form: LayerForm, k: usize) -> Self {
         match k {
             0 => Self::Base,
-            _ if k <= form.levels => Self::Refinement(k - 1),
-            _ if k < form.interim_range() => Self::Sh(k - 1 - form.levels),
+            _ if k <= form.refinements => Self::Refinement(k - 1),
+            _ if k < form.interim_range() => Self::Sh(k - 1 - form.refinements),
             _ => Self::Interim,
         }
     }
@@ -104,7 +105,7 @@ impl fmt::Display for RangeKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Base => f.write_str("the base"),
-            // The format numbers refinements from 1, and parts from 0.
+            // The format numbers refinements from 1, and SH parts from 0.
             Self::Refinement(k) => write!(f, "refinement {}", k + 1),
             Self::Sh(k) => write!(f, "part {k} of SH-rest"),
             Self::Interim => f.write_str("the range of interim changes"),
@@ -115,9 +116,10 @@ impl fmt::Display for RangeKind {
 impl Outline {
     /// Creates the outline of `index`. The data start at byte `data_start` of the file.
     pub(in crate::packed) fn new(index: &Index, data_start: u64) -> Self {
-        let layer = |form: &LayerForm| {
-            let (levels, sh_parts) = (form.levels, form.parts);
-            LayerOutline { levels, sh_parts, ..LayerOutline::default() }
+        let layer = |form: &LayerForm| LayerOutline {
+            levels: form.refinements,
+            sh_parts: form.sh_parts,
+            ..LayerOutline::default()
         };
         let mut layers: Vec<LayerOutline> = index.layers.iter().map(layer).collect();
         let mut chunks = Vec::with_capacity(index.chunks.len());
@@ -147,12 +149,12 @@ impl Outline {
     /// Returns the index of a range within its chunk, by which errors name it.
     pub(crate) fn number(&self, range: &RangeOutline) -> usize {
         let layer = self.chunks.get(range.chunk).and_then(|chunk| self.layers.get(chunk.layer));
-        let (levels, parts) = layer.map_or((0, 0), |layer| (layer.levels, layer.sh_parts));
+        let (refinements, sh_parts) = layer.map_or((0, 0), |layer| (layer.levels, layer.sh_parts));
         match range.kind {
             RangeKind::Base => 0,
-            RangeKind::Refinement(level) => 1 + level,
-            RangeKind::Sh(part) => 1 + levels + part,
-            RangeKind::Interim => 1 + levels + parts,
+            RangeKind::Refinement(k) => 1 + k,
+            RangeKind::Sh(k) => 1 + refinements + k,
+            RangeKind::Interim => 1 + refinements + sh_parts,
         }
     }
 

@@ -18,7 +18,7 @@ impl Packed {
     /// otherwise in the order of the file.
     ///
     /// # Errors
-    /// [`crate::Error::Format`] that names the damaged part; [`crate::Error::Limit`] if the scene is larger than the limits
+    /// [`crate::Error::Format`] that names the damaged range; [`crate::Error::Limit`] if the scene is larger than the limits
     /// of its reader.
     pub fn unpack(&self) -> Result<Model> {
         self.unpack_with(&self.decoder()?)

@@ -1,4 +1,4 @@
-//! What a Gaussian shows, apart from its shape and its view-dependent colour.
+//! The appearance of a Gaussian: its base colour and its opacity.
 
 use super::canonical::MIN_LOG_OPACITY;
 use crate::packed::bitstream::KINDS;

@@ -1,8 +1,8 @@
-//! The canonical form of a scene: one of the 24 descriptions of each ellipsoid, and what is coded of it.
+//! The canonical form of a Gaussian: one of the 24 descriptions of its ellipsoid, and the values that are coded.
 
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
 use crate::packed::bitstream::integer_model::VALUE_BITS;
-use crate::packed::bitstream::parameters::{CHANGES, Parameters};
+use crate::packed::bitstream::parameters::{CHANGES, ColourAndShape, Parameters};
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, columns, cross, dot, log_sigmoid, longest_first};
 
@@ -66,12 +66,12 @@ fn value(x: f64) -> i32 {
 }
 
 impl Canonical {
-    /// Returns all that is coded of it but its SH-rest. `dc_unit` is the unit of base colours.
+    /// Returns all values that are coded, except SH-rest. `dc_unit` is the unit of base colours.
     pub(in crate::packed) fn coded(
         &self,
         cell: u64,
         centre: [f64; 3],
-        classes: [u8; 2],
+        classes: ColourAndShape<u8>,
         parameters: &Parameters,
         dc_unit: f64,
     ) -> CodedGaussian {

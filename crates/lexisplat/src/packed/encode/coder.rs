@@ -7,8 +7,8 @@ use super::canonical::canonical;
 use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_atoms, learn};
 use super::options::PackOptions;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
-use crate::packed::bitstream::parameters::Parameters;
-use crate::packed::bitstream::{MeanView, WholeAtoms, morton, seen_row};
+use crate::packed::bitstream::parameters::{ColourAndShape, Parameters};
+use crate::packed::bitstream::{PointsOfView, WholeAtoms, morton, seen_row};
 use crate::packed::curve::MortonKey;
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::Splats;
@@ -52,38 +52,42 @@ pub(in crate::packed) const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 pub(in crate::packed) struct OrderedGaussians<'a> {
     pub(in crate::packed) splats: &'a Splats,
     /// The index in `splats`, and the cell, of each Gaussian.
-    pub(in crate::packed) scene: &'a [MortonKey],
-    /// The colour class and the shape class of each Gaussian of `scene`.
-    pub(in crate::packed) classes: &'a [[u8; 2]],
-    /// The appearance of each Gaussian of `scene`, instead of the base colours and opacities of `splats`.
+    pub(in crate::packed) keys: &'a [MortonKey],
+    /// The classes of each Gaussian of `keys`.
+    pub(in crate::packed) classes: &'a [ColourAndShape<u8>],
+    /// The appearance of each Gaussian of `keys`, instead of the base colours and opacities of `splats`.
     pub(in crate::packed) appearances: Option<&'a [Appearance]>,
     /// The interim change of each Gaussian of the first layer, in addition to its growth.
     pub(in crate::packed) changes: Option<&'a [AppearanceChange]>,
 }
 
 impl<'a> OrderedGaussians<'a> {
-    /// Creates a view of Gaussians with their own base colours and opacities, without interim changes.
-    pub(in crate::packed) fn new(splats: &'a Splats, scene: &'a [MortonKey], classes: &'a [[u8; 2]]) -> Self {
-        Self { splats, scene, classes, appearances: None, changes: None }
+    /// Creates a list of Gaussians with their own base colours and opacities, without interim changes.
+    pub(in crate::packed) fn new(
+        splats: &'a Splats,
+        keys: &'a [MortonKey],
+        classes: &'a [ColourAndShape<u8>],
+    ) -> Self {
+        Self { splats, keys, classes, appearances: None, changes: None }
     }
 
-    /// Returns the Gaussians `range`. `changes` stays whole, so it is indexed from the first Gaussian of the file.
-    pub(in crate::packed) fn part(self, range: std::ops::Range<usize>) -> Self {
+    /// Returns the Gaussians `rows`. `changes` stays whole, so it is indexed from the first Gaussian of the file.
+    pub(in crate::packed) fn slice(self, rows: std::ops::Range<usize>) -> Self {
         Self {
             splats: self.splats,
-            scene: &self.scene[range.clone()],
-            classes: &self.classes[range.clone()],
-            appearances: self.appearances.map(|all| &all[range.clone()]),
+            keys: &self.keys[rows.clone()],
+            classes: &self.classes[rows.clone()],
+            appearances: self.appearances.map(|all| &all[rows.clone()]),
             changes: self.changes,
         }
     }
 
     pub(in crate::packed) fn len(self) -> usize {
-        self.scene.len()
+        self.keys.len()
     }
 
     fn row(self, i: usize) -> &'a [f32] {
-        self.splats.rest(self.scene[i].index())
+        self.splats.rest(self.keys[i].index())
     }
 
     /// Returns the rows of the Gaussians `indices` in units of their value steps, and their colour classes.
@@ -95,7 +99,7 @@ impl<'a> OrderedGaussians<'a> {
         let mut rows = Vec::new();
         let mut classes = Vec::new();
         for i in indices {
-            let class = self.classes[i][0];
+            let class = self.classes[i].colour;
             let inverse = 1.0 / parameters.value_step(class);
             rows.extend(self.row(i).iter().map(|x| x * inverse));
             classes.push(class);
@@ -109,18 +113,18 @@ impl<'a> OrderedGaussians<'a> {
 pub(in crate::packed) struct ChunkCoder {
     pub(in crate::packed) parameters: Parameters,
     pub(in crate::packed) dictionary: Dictionary,
-    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) points_of_view: PointsOfView,
     book: Option<Codebook>,
     stop: StopRule,
     tolerance: Option<f64>,
 }
 
 impl ChunkCoder {
-    /// Learns a coder from the Gaussians of `view`, which is a whole scene. Returns the atoms too.
+    /// Learns a coder from `gaussians`, which are a whole scene. Returns the atoms too.
     pub(in crate::packed) fn new(
-        view: OrderedGaussians<'_>,
+        gaussians: OrderedGaussians<'_>,
         mut parameters: Parameters,
-        mean_view: MeanView,
+        points_of_view: PointsOfView,
         options: &PackOptions,
         progress: &dyn Progress,
     ) -> Result<(Self, WholeAtoms)> {
@@ -128,19 +132,19 @@ impl ChunkCoder {
         if !parameters.are_usable() {
             return Err(too_large());
         }
-        let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(view.len()).take(SAMPLE);
-        let (rows, classes) = view.scaled(sample, &parameters.for_learning());
-        let learning = Learning { degree: view.splats.degree, total: view.len(), stop, options };
+        let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(gaussians.len()).take(SAMPLE);
+        let (rows, classes) = gaussians.scaled(sample, &parameters.for_learning());
+        let learning = Learning { degree: gaussians.splats.degree, total: gaussians.len(), stop, options };
         let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
         parameters.factors[VALUES] *= step;
-        let coder = Self::learned(parameters, mean_view, &atoms, costs, stop, options.tolerance)?;
+        let coder = Self::learned(parameters, points_of_view, &atoms, costs, stop, options.tolerance)?;
         Ok((coder, atoms))
     }
 
     /// Creates a coder of learned `atoms`. `costs` are the costs of symbols.
     pub(in crate::packed) fn learned(
         parameters: Parameters,
-        mean_view: MeanView,
+        points_of_view: PointsOfView,
         atoms: &WholeAtoms,
         costs: Costs,
         stop: StopRule,
@@ -151,20 +155,20 @@ impl ChunkCoder {
         let rows = atoms.rows();
         let book = (dim > 0).then(|| Codebook::new(dim, rows.clone(), costs));
         let dictionary = if dim > 0 { Dictionary::new(degree, rows)? } else { Dictionary::empty() };
-        Ok(Self { parameters, dictionary, mean_view, book, stop, tolerance })
+        Ok(Self { parameters, dictionary, points_of_view, book, stop, tolerance })
     }
 
-    /// Returns the codes of all Gaussians of `view`; none for scenes without SH-rest.
-    pub(in crate::packed) fn codes(&self, view: OrderedGaussians<'_>) -> Codes {
+    /// Returns the codes of `gaussians`; none for scenes without SH-rest.
+    pub(in crate::packed) fn codes(&self, gaussians: OrderedGaussians<'_>) -> Codes {
         let Some(book) = &self.book else { return Codes::default() };
-        let (rows, classes) = view.scaled(0..view.len(), &self.parameters);
+        let (rows, classes) = gaussians.scaled(0..gaussians.len(), &self.parameters);
         book.encode(&rows, &classes, self.stop)
     }
 
-    /// Returns the targets of all Gaussians of `view`, and counts of their codes. Base colours are in units of `dc_unit`.
+    /// Returns the targets of `gaussians`, and counts of their codes. Base colours are in units of `dc_unit`.
     pub(in crate::packed) fn targets(
         &self,
-        view: OrderedGaussians<'_>,
+        gaussians: OrderedGaussians<'_>,
         codes: &Codes,
         dc_unit: f64,
     ) -> Result<(Tally, Vec<CodedGaussian>)> {
@@ -173,23 +177,23 @@ impl ChunkCoder {
         let mut tally = Tally::new(dim);
         let mut values: Vec<(u16, f16)> = Vec::new();
         let mut rebuilt = vec![0.0_f32; dim];
-        let mut targets = Vec::with_capacity(view.len());
-        for i in 0..view.len() {
-            let placed = view.scene[i];
-            let mut form = canonical(&view.splats.geometry, placed.index());
-            if let Some(appearances) = view.appearances {
+        let mut targets = Vec::with_capacity(gaussians.len());
+        for i in 0..gaussians.len() {
+            let placed = gaussians.keys[i];
+            let mut form = canonical(&gaussians.splats.geometry, placed.index());
+            if let Some(appearances) = gaussians.appearances {
                 let Appearance { dc, log_opacity } = appearances[i];
                 (form.dc, form.log_opacity) = (dc, log_opacity);
             }
-            let classes = view.classes[i];
+            let classes = gaussians.classes[i];
             let centre = parameters.centre(morton::decode(placed.cell).unwrap_or_default());
             let mut shown = [0.0; 3];
             let (mut code, mut exact) = (Vec::new(), Vec::new());
             if dim > 0 {
-                resident(codes.row(i), parameters.value_step(classes[0]), &mut values);
+                resident(codes.row(i), parameters.value_step(classes.colour), &mut values);
                 let pairs = values.iter().map(|&(atom, value)| (usize::from(atom), value.to_f32()));
                 reconstruct(dictionary, pairs, &mut rebuilt);
-                let row = view.row(i);
+                let row = gaussians.row(i);
                 let squares = row.iter().zip(&rebuilt).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
                 let error = squares.sum::<f64>().sqrt();
                 let storable = values.iter().all(|v| v.1.is_finite());
@@ -200,8 +204,8 @@ impl ChunkCoder {
                     exact = row.to_vec();
                     tally.escapes += 1;
                 }
-                if !self.mean_view.points.is_empty() {
-                    let weights = self.mean_view.weights(dictionary.degree(), form.position);
+                if !self.points_of_view.points.is_empty() {
+                    let weights = self.points_of_view.weights(dictionary.degree(), form.position);
                     let weights = weights.get(..dictionary.degree().rest_per_channel()).unwrap_or_default();
                     shown = seen_row(if exact.is_empty() { &rebuilt } else { &exact }, weights);
                 }

@@ -9,9 +9,9 @@ use super::layering::Layering;
 use super::options::PackOptions;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::bitstream::{
-    Chunk, CodedChunk, Form, Head, Index, LayerForm, Place, Range, Stream, WholeAtoms, lanes, stream_of,
+    Chunk, CodedChunk, Form, Head, Index, LayerForm, Place, Range, RecordedRange, Stream, WholeAtoms, lanes,
+    stream_of,
 };
-use crate::packed::entropy::rans_encoder::SymbolRecorder;
 use crate::packed::entropy::tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};
 use crate::packed::scene::{PackedHead, UNNAMED};
 use crate::scene::splats::SceneMeta;
@@ -35,12 +35,12 @@ impl Counts {
     /// Counts the symbols and the raw bits of one chunk or of the dictionary.
     pub(in crate::packed) fn of<'r>(
         tally: Tally,
-        ranges: impl IntoIterator<Item = &'r SymbolRecorder>,
+        ranges: impl IntoIterator<Item = &'r RecordedRange>,
     ) -> Self {
         let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
         let mut raw_bits = BitCounts::zeros();
         for range in ranges {
-            range.each(
+            range.symbols.each(
                 |context, symbol| histograms[context].add(symbol),
                 |stream, bits| raw_bits.0[stream] += f64::from(bits),
             );
@@ -73,21 +73,31 @@ pub(in crate::packed) struct Written {
     cell: u64,
     bounds: [[f32; 3]; 2],
     energy: f64,
-    /// The bytes of each range, and the checksum of the integers that it decodes to.
-    pub(in crate::packed) ranges: Vec<(Vec<u8>, u32)>,
+    pub(in crate::packed) ranges: Vec<WrittenRange>,
+}
+
+/// The bytes of a range.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::packed) struct WrittenRange {
+    pub(in crate::packed) bytes: Vec<u8>,
+    /// CRC-32 of the integers that the bytes decode to.
+    integers: u32,
 }
 
 impl Written {
     pub(in crate::packed) fn new(layer: usize, chunk: &CodedChunk, tables: &Tables) -> Self {
         let lanes = lanes(chunk.gaussians);
-        let ranges = chunk.ranges.iter().map(|(range, sum)| (range.finish(tables, lanes), *sum));
+        let written = |range: &RecordedRange| WrittenRange {
+            bytes: range.symbols.finish(tables, lanes),
+            integers: range.integers,
+        };
         Self {
             layer,
             gaussians: chunk.gaussians,
             cell: chunk.cell,
             bounds: chunk.bounds,
             energy: chunk.energy,
-            ranges: ranges.collect(),
+            ranges: chunk.ranges.iter().map(written).collect(),
         }
     }
 
@@ -100,15 +110,15 @@ impl Written {
         lookup: &Lookup,
         tables: &Tables,
     ) -> Option<Self> {
-        let own: Vec<&[u8]> = self.ranges.iter().map(|(bytes, _)| bytes.as_slice()).collect();
+        let own: Vec<&[u8]> = self.ranges.iter().map(|range| range.bytes.as_slice()).collect();
         let symbols = form.transcribe(layer, self.gaussians, lookup, &own)?;
         if !symbols.iter().all(|range| range.is_within(tables)) {
             return None;
         }
         let lanes = lanes(self.gaussians);
         let coded = symbols.iter().map(|range| range.finish(tables, lanes));
-        let ranges = coded.zip(&self.ranges).map(|(bytes, (_, sum))| (bytes, *sum)).collect();
-        Some(Self { ranges, ..self.clone() })
+        let ranges = coded.zip(&self.ranges).map(|(bytes, own)| WrittenRange { bytes, ..*own });
+        Some(Self { ranges: ranges.collect(), ..self.clone() })
     }
 }
 
@@ -149,8 +159,8 @@ impl Encoding {
     ) -> Self {
         let mut counts = Counts::of(Tally::new(coder.dictionary.dim()), []);
         let rest = layering.rest(coder.dictionary.dim(), coder.dictionary.len());
-        let mean_view = coder.mean_view.clone();
-        let mut head = Head::new(&coder.parameters, most_dc, rest, &atoms, mean_view);
+        let points_of_view = coder.points_of_view.clone();
+        let mut head = Head::new(&coder.parameters, most_dc, rest, &atoms, points_of_view);
         if layering.layers() > 1 {
             head = head.with_interim(STEPS);
         }
@@ -190,12 +200,12 @@ impl Encoding {
     ) -> Result<Finished> {
         let Self { coder, layering, mut head, counts, learn_seconds, clock, .. } = self;
         let stream_bits = counts.bits(tables).named();
-        let parts = head.rest.least.len();
-        let forms = layering.forms(parts);
+        let sh_parts = head.rest.least.len();
+        let forms = layering.forms(sh_parts);
         let Ranges { spill, mut chunks, .. } = ranges;
         chunks.sort_by_key(|(chunk, _): &(Chunk, f64)| chunk.layer);
         let (chunks, energies): (Vec<Chunk>, Vec<f64>) = chunks.into_iter().unzip();
-        let order = layering.order(&chunks, &energies, parts);
+        let order = layering.order(&chunks, &energies, sh_parts);
         let piece = |place: &Place| {
             let range = &chunks[place.chunk as usize].ranges[usize::from(place.kind)];
             (range.start, range.length as usize)
@@ -207,8 +217,9 @@ impl Encoding {
         let data = Woven::new(spill.finish()?, pieces);
         head.tables = tables.write();
         let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
-        let seconds = [learn_seconds, clock.seconds() - learn_seconds];
-        let (record, mut report) = counts.tally.into_report(record, gaussians, None, seconds);
+        let (record, mut report) = counts.tally.into_report(record, gaussians);
+        report.learn_seconds = learn_seconds;
+        report.code_seconds = clock.seconds() - learn_seconds;
         report.stream_bits = stream_bits;
         let head = PackedHead {
             file: UNNAMED.to_owned(),
@@ -255,7 +266,7 @@ impl Ranges {
     pub(in crate::packed) fn push(&mut self, written: Written) -> Result<()> {
         let Written { layer, gaussians, cell, bounds, energy, ranges } = written;
         let mut chunk = Chunk { layer, gaussians, cell, bounds, ..Chunk::default() };
-        for (bytes, integers) in &ranges {
+        for WrittenRange { bytes, integers } in &ranges {
             let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
             let length = u32::try_from(bytes.len()).map_err(too_long)?;
             let checksum = crc32::hash(bytes);

@@ -5,21 +5,21 @@ use serde::{Deserialize, Serialize};
 use super::canonical::{Canonical, canonical};
 use super::neighbours::Neighbours;
 use super::octaves::Histogram;
-use crate::packed::bitstream::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
+use crate::packed::bitstream::parameters::{ColourAndShape, FEATURES, LAST_CLASS, Parameters, TARGETS};
 use crate::packed::bitstream::rounded_axes;
 use crate::packed::curve::{Grid, MortonKey};
-use crate::scene::sensitivity::Sensitivity;
+use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity};
 use crate::scene::sh::C0;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, at_share};
 
-/// Floor of weights, as a share of the 90th percentile of weights. Other views may show Gaussians that the measured views
+/// Floor of sensitivities, as a share of their 90th percentile. Other views may show Gaussians that the measured views
 /// did not.
-const WEIGHT_FLOOR: f64 = 1e-3;
+const SENSITIVITY_FLOOR: f64 = 1e-3;
 const FLOOR_QUANTILE: f64 = 0.9;
-/// Quantile of weights from which class 0 is set. Larger weights do not make its steps finer.
+/// Quantile of sensitivities from which class 0 is set. Larger sensitivities do not make its steps finer.
 const TOP_QUANTILE: f64 = 0.9995;
-/// Quantile of weights below which Gaussians do not count when the dependence of steps on shape is fitted.
+/// Quantile of sensitivities below which Gaussians do not count when the dependence of steps on shape is fitted.
 const FIT_QUANTILE: f64 = 0.05;
 /// Added to the squared derivative by scale, rotation or position before its logarithm is taken, as a share of that by
 /// opacity.
@@ -46,36 +46,39 @@ const MOST_SLOPE: f64 = 7.9;
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Fit {
     pub(in crate::packed) steps: Steps,
-    /// The colour class and the shape class of each Gaussian, before rounding.
-    pub(in crate::packed) classes: Vec<[f32; 2]>,
+    /// The classes of each Gaussian, before rounding.
+    pub(in crate::packed) classes: Vec<ColourAndShape<f32>>,
 }
 
 /// The steps and predictors of a scene, relative to the overall step.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::packed) struct Steps {
     pub(in crate::packed) parameters: Parameters,
-    /// The classes of weights for colour and for shape.
-    kinds: [Classes; 2],
+    classes: ColourAndShape<Classes>,
 }
 
 impl Fit {
-    /// Fits steps and predictors. `scene` is the order in which the Gaussians of `geometry` are coded, and `dc` their base
+    /// Fits steps and predictors. `keys` is the order in which the Gaussians of `geometry` are coded, and `dc` their base
     /// colours.
     pub(in crate::packed) fn new(
         geometry: &Geometry,
         dc: &[Vec3],
         sensitivity: &Sensitivity,
-        scene: &[MortonKey],
+        keys: &[MortonKey],
         grid: &Grid,
     ) -> Self {
-        let weights: Vec<[f32; 2]> = scene.iter().map(|g| sensitivity.appearance(g.index())).collect();
-        let kinds = [0, 1].map(|kind| Classes::fit(weights.iter().map(|w| w[kind])));
+        let sensitivities: Vec<AppearanceSensitivity> =
+            keys.iter().map(|g| sensitivity.appearance(g.index())).collect();
+        let classes = ColourAndShape {
+            colour: Classes::fit(sensitivities.iter().map(|s| s.colour)),
+            shape: Classes::fit(sensitivities.iter().map(|s| s.opacity)),
+        };
         let mut derivatives = Derivatives::default();
-        derivatives.add(geometry, sensitivity, scene);
-        let mut steps = Steps::new(grid, kinds, colour_axes(dc, scene), &derivatives);
-        let classes = steps.classes_of(&weights);
+        derivatives.add(geometry, sensitivity, keys);
+        let mut steps = Steps::new(grid, classes, colour_axes(dc, keys), &derivatives);
+        let classes = steps.classes_of(&sensitivities);
         let mut predictors = Predictors::default();
-        predictors.add(geometry, dc, scene, &classes, &steps.parameters);
+        predictors.add(geometry, dc, keys, &classes, &steps.parameters);
         predictors.solve(&mut steps.parameters);
         Self { steps, classes }
     }
@@ -85,7 +88,7 @@ impl Steps {
     /// Creates steps without predictors.
     pub(in crate::packed) fn new(
         grid: &Grid,
-        kinds: [Classes; 2],
+        classes: ColourAndShape<Classes>,
         (dc_mean, dc_axes): (Vec3, [Vec3; 3]),
         derivatives: &Derivatives,
     ) -> Self {
@@ -108,20 +111,27 @@ impl Steps {
             dc_axes,
             ..Parameters::default()
         };
-        Self { parameters, kinds }
+        Self { parameters, classes }
     }
 
-    /// Returns the colour class and the shape class of each Gaussian, before rounding. `weights` are its sensitivities to
-    /// colour and opacity.
-    pub(in crate::packed) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
-        weights.iter().map(|w| [self.kinds[0].of(w[0]), self.kinds[1].of(w[1])]).collect()
+    /// Returns the classes of Gaussians of these sensitivities, before rounding.
+    pub(in crate::packed) fn classes_of(
+        &self,
+        sensitivities: &[AppearanceSensitivity],
+    ) -> Vec<ColourAndShape<f32>> {
+        let ColourAndShape { colour, shape } = self.classes;
+        let of = |s: &AppearanceSensitivity| ColourAndShape {
+            colour: colour.of(s.colour),
+            shape: shape.of(s.opacity),
+        };
+        sensitivities.iter().map(of).collect()
     }
 
     /// Returns the parameters for the overall step `step`. It is about the square root of the mean squared error of
     /// pictures that one value of one Gaussian may cause.
     pub(in crate::packed) fn with_step(&self, step: f64) -> Parameters {
         let base = |unit: f64| single((unit * step).clamp(STEPS[0], STEPS[1]));
-        Parameters { base: self.kinds.map(|k| base(k.unit())), ..self.parameters.clone() }
+        Parameters { base: self.classes.map(|c| base(c.unit())), ..self.parameters.clone() }
     }
 }
 
@@ -136,38 +146,38 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     at_share(&sorted, share)
 }
 
-/// The classes of steps of a scene. A class has the step `2^class / 2^top`, which is about `1 / sqrt(weight)`.
+/// The classes of steps of a scene. A class has the step `2^class / 2^top`, which is about `1 / sqrt(sensitivity)`.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(in crate::packed) struct Classes {
-    /// Added to every weight before its logarithm is taken.
+    /// Added to every sensitivity before its logarithm is taken.
     floor: f64,
-    /// Half the binary logarithm of the weight of class 0, a whole number.
+    /// Half the binary logarithm of the sensitivity of class 0, a whole number.
     top: f64,
 }
 
 impl Classes {
-    /// Fits classes to a list of weights.
-    fn fit(weights: impl Iterator<Item = f32>) -> Self {
-        let mut weights: Vec<f64> = weights.map(f64::from).collect();
-        weights.sort_by(f64::total_cmp);
-        Self::of_quantiles(|share| at_share(&weights, share))
+    /// Fits classes to a list of sensitivities.
+    fn fit(sensitivities: impl Iterator<Item = f32>) -> Self {
+        let mut sorted: Vec<f64> = sensitivities.map(f64::from).collect();
+        sorted.sort_by(f64::total_cmp);
+        Self::of_quantiles(|share| at_share(&sorted, share))
     }
 
-    /// Fits classes to a histogram of weights.
-    pub(in crate::packed) fn of_histogram(weights: &Histogram) -> Self {
-        Self::of_quantiles(|share| weights.quantile(share).into())
+    /// Fits classes to a histogram of sensitivities.
+    pub(in crate::packed) fn of_histogram(sensitivities: &Histogram) -> Self {
+        Self::of_quantiles(|share| sensitivities.quantile(share).into())
     }
 
-    /// Fits classes to weights with these quantiles.
+    /// Fits classes to sensitivities with these quantiles.
     fn of_quantiles(quantile: impl Fn(f64) -> f64) -> Self {
-        let floor = (quantile(FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
+        let floor = (quantile(FLOOR_QUANTILE) * SENSITIVITY_FLOOR).max(1e-30);
         let top = 0.5 * libm::log2(quantile(TOP_QUANTILE) + floor);
         Self { floor, top: top.round() }
     }
 
-    /// Returns the class of a weight, before rounding.
-    fn of(self, weight: f32) -> f32 {
-        single(self.top - 0.5 * libm::log2(f64::from(weight) + self.floor))
+    /// Returns the class of a sensitivity, before rounding.
+    fn of(self, sensitivity: f32) -> f32 {
+        single(self.top - 0.5 * libm::log2(f64::from(sensitivity) + self.floor))
     }
 
     /// Returns the step of class 0 at an overall step of 1.
@@ -184,9 +194,9 @@ pub(in crate::packed) fn rounded(class: f32) -> u8 {
 }
 
 /// Returns the mean base colour and the principal axes of base colours, strongest first.
-fn colour_axes(dc: &[Vec3], scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
-    let dc = || scene.iter().map(|g| dc[g.index()]);
-    let n = scene.len().max(1) as f64;
+fn colour_axes(dc: &[Vec3], keys: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
+    let dc = || keys.iter().map(|g| dc[g.index()]);
+    let n = keys.len().max(1) as f64;
     let mean: Vec3 = std::array::from_fn(|c| single(dc().map(|dc| f64::from(dc[c])).sum::<f64>() / n));
     let deviations: Vec<f32> =
         dc().flat_map(|dc| std::array::from_fn::<f32, 3, _>(|c| dc[c] - mean[c])).collect();
@@ -256,17 +266,17 @@ impl Default for Derivatives {
 }
 
 impl Derivatives {
-    /// Adds the Gaussians of `scene`. Those with the smallest weights do not count.
+    /// Adds the Gaussians of `keys`. Gaussians with the smallest sensitivities do not count.
     pub(in crate::packed) fn add(
         &mut self,
         geometry: &Geometry,
         sensitivity: &Sensitivity,
-        scene: &[MortonKey],
+        keys: &[MortonKey],
     ) {
-        let weights: Vec<f64> = sensitivity.opacity.iter().map(|&w| f64::from(w)).collect();
-        let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
-        for placed in scene.iter().filter(|g| weights[g.index()] > least) {
-            let by_opacity = weights[placed.index()];
+        let by_opacities: Vec<f64> = sensitivity.opacity.iter().map(|&s| f64::from(s)).collect();
+        let least = quantile(&by_opacities, FIT_QUANTILE).max(1e-30);
+        for placed in keys.iter().filter(|g| by_opacities[g.index()] > least) {
+            let by_opacity = by_opacities[placed.index()];
             let g = canonical(geometry, placed.index());
             let by_axis = by_axis(sensitivity, placed.index(), &g);
             let scales = g.scales.map(f64::from);
@@ -335,19 +345,19 @@ impl Default for Predictors {
 }
 
 impl Predictors {
-    /// Adds the Gaussians of `scene`, with their classes before rounding. A Gaussian is predicted from those before it in
-    /// `scene`.
+    /// Adds the Gaussians of `keys`, with their classes before rounding. A Gaussian is predicted from those before it in
+    /// `keys`.
     pub(in crate::packed) fn add(
         &mut self,
         geometry: &Geometry,
         dc: &[Vec3],
-        scene: &[MortonKey],
-        classes: &[[f32; 2]],
+        keys: &[MortonKey],
+        classes: &[ColourAndShape<f32>],
         parameters: &Parameters,
     ) {
-        self.count += scene.len() as u64;
+        self.count += keys.len() as u64;
         let mut neighbours = Neighbours::default();
-        for (placed, class) in scene.iter().zip(classes) {
+        for (placed, class) in keys.iter().zip(classes) {
             let mut g = canonical(geometry, placed.index());
             g.dc = dc[placed.index()];
             let coordinates = parameters.dc_coordinates(g.dc);
@@ -365,7 +375,7 @@ impl Predictors {
             }
             if let Some(around) = neighbours.average(g.position, 0.5 * parameters.cell) {
                 for (t, equations) in self.equations.iter_mut().enumerate() {
-                    let [colour, shape] = class.map(|class| f32::from(rounded(class)));
+                    let ColourAndShape { colour, shape } = class.map(|class| f32::from(rounded(class)));
                     let known = |k: usize| if t > k { values[k] } else { 0.0 };
                     let features = [1.0, around[t], colour, shape, known(0), known(1), known(2)];
                     equations.add(features.map(f64::from), f64::from(values[t]));

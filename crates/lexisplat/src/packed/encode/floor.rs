@@ -1,13 +1,15 @@
-//! The floor: the coarsest steps that a visible Gaussian may have, whatever sensitivity was measured.
+//! The floor: the coarsest steps that a visible Gaussian may have at any sensitivity.
 //!
-//! The measured views do not show what other views show. The limits are shares of a Gaussian's own size, turn, opacity and
-//! colour, so that another view may look worse but not broken (docs/METHOD.md, "The floor").
+//! Other views may show Gaussians that the measured views hardly show. The limits are shares of a Gaussian's own size,
+//! turn, opacity and colour, so that another view may look worse but not broken (docs/METHOD.md, "The floor").
 
 use serde::{Deserialize, Serialize};
 
 use super::canonical::canonical;
 use super::fit::rounded;
-use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, least_axis, rotation_steps};
+use crate::packed::bitstream::parameters::{
+    ColourAndShape, LAST_CLASS, Parameters, least_axis, rotation_steps,
+};
 use crate::packed::curve::MortonKey;
 use crate::scene::sh::C0;
 use crate::scene::splats::Geometry;
@@ -38,21 +40,21 @@ const EXACT: f32 = 1e-3;
 pub(in crate::packed) struct Floor {
     pub(in crate::packed) parameters: Parameters,
     /// Octaves by which the steps of class 0 were made smaller, for colour and for shape. They are added to classes.
-    added: [f32; 2],
+    added: ColourAndShape<f32>,
     limited: bool,
 }
 
 impl Floor {
     /// Returns parameters without limits.
     pub(in crate::packed) fn none(parameters: Parameters) -> Self {
-        Self { parameters, added: [0.0; 2], limited: false }
+        Self { parameters, added: ColourAndShape::default(), limited: false }
     }
 
-    /// Makes the steps of class 0 of `parameters` small enough for all Gaussians of `scene`. Also shifts the steps so that
+    /// Makes the steps of class 0 of `parameters` small enough for all Gaussians of `keys`. Also shifts the steps so that
     /// those of some class are exactly the limits of colours and logarithms.
-    pub(in crate::packed) fn new(parameters: Parameters, geometry: &Geometry, scene: &[MortonKey]) -> Self {
+    pub(in crate::packed) fn new(parameters: Parameters, geometry: &Geometry, keys: &[MortonKey]) -> Self {
         let floor = Self::begin(parameters);
-        let over = floor.over(geometry, scene);
+        let over = floor.over(geometry, keys);
         floor.within(over)
     }
 
@@ -60,28 +62,28 @@ impl Floor {
     pub(in crate::packed) fn begin(mut parameters: Parameters) -> Self {
         // If a limit were between two classes, all Gaussians at it would change their steps at once as the overall step
         // grows.
-        let over = [colour_over(&parameters), logs_over(&parameters)].map(log2);
-        let added = over.map(|over| over - over.round().min(0.0));
+        let over = ColourAndShape { colour: colour_over(&parameters), shape: logs_over(&parameters) };
+        let added = over.map(log2).map(|over| over - over.round().min(0.0));
         rescale(&mut parameters, added);
         Self { parameters, added, limited: true }
     }
 
-    /// Returns by how many octaves the steps of shape class 0 are too large for the Gaussians of `scene`; 0 if they are
+    /// Returns by how many octaves the steps of shape class 0 are too large for the Gaussians of `keys`; 0 if they are
     /// not. For several parts of a scene, the largest of their numbers counts.
-    pub(in crate::packed) fn over(&self, geometry: &Geometry, scene: &[MortonKey]) -> f32 {
-        let parts = map_chunks(scene.len(), GAUSSIANS_PER_TASK, |range| {
-            let coarsest = scene[range].iter().map(|&g| coarsest(&self.parameters, geometry, g)[1]);
+    pub(in crate::packed) fn over(&self, geometry: &Geometry, keys: &[MortonKey]) -> f32 {
+        let tasks = map_chunks(keys.len(), GAUSSIANS_PER_TASK, |range| {
+            let coarsest = keys[range].iter().map(|&g| coarsest(&self.parameters, geometry, g).shape);
             coarsest.fold(0.0, f32::min)
         });
-        -parts.into_iter().fold(0.0, f32::min)
+        -tasks.into_iter().fold(0.0, f32::min)
     }
 
     /// Makes the steps of shape class 0 smaller by `over` octaves, at most by [`MOST_OCTAVES`]. `over` is the largest
     /// result of [`Self::over`] over the parts of a scene.
     pub(in crate::packed) fn within(mut self, over: f32) -> Self {
         let shape = over.min(MOST_OCTAVES);
-        rescale(&mut self.parameters, [0.0, shape]);
-        self.added[1] += shape;
+        rescale(&mut self.parameters, ColourAndShape { colour: 0.0, shape });
+        self.added.shape += shape;
         self
     }
 
@@ -89,37 +91,39 @@ impl Floor {
     /// them.
     pub(in crate::packed) fn classes(
         &self,
-        classes: &[[f32; 2]],
+        classes: &[ColourAndShape<f32>],
         geometry: &Geometry,
-        scene: &[MortonKey],
-    ) -> Vec<[u8; 2]> {
+        keys: &[MortonKey],
+    ) -> Vec<ColourAndShape<u8>> {
         if !self.limited {
             return classes.iter().map(|class| class.map(rounded)).collect();
         }
-        let parts = map_chunks(scene.len(), GAUSSIANS_PER_TASK, |range| {
-            let within = |(class, &placed): (&[f32; 2], &MortonKey)| {
+        let tasks = map_chunks(keys.len(), GAUSSIANS_PER_TASK, |range| {
+            let within = |(class, &placed): (&ColourAndShape<f32>, &MortonKey)| {
                 let coarsest = coarsest(&self.parameters, geometry, placed);
-                std::array::from_fn(|kind| rounded((class[kind] + self.added[kind]).min(coarsest[kind])))
+                ColourAndShape {
+                    colour: rounded((class.colour + self.added.colour).min(coarsest.colour)),
+                    shape: rounded((class.shape + self.added.shape).min(coarsest.shape)),
+                }
             };
-            classes[range.clone()].iter().zip(&scene[range]).map(within).collect::<Vec<[u8; 2]>>()
+            classes[range.clone()].iter().zip(&keys[range]).map(within).collect::<Vec<_>>()
         });
-        parts.concat()
+        tasks.concat()
     }
 }
 
 /// Divides the steps of class 0 by `2^octaves`, for colour and for shape.
-fn rescale(parameters: &mut Parameters, octaves: [f32; 2]) {
-    for (base, octaves) in parameters.base.iter_mut().zip(octaves) {
-        *base *= exp2(-octaves);
-    }
+fn rescale(parameters: &mut Parameters, octaves: ColourAndShape<f32>) {
+    parameters.base.colour *= exp2(-octaves.colour);
+    parameters.base.shape *= exp2(-octaves.shape);
 }
 
-/// Returns the coarsest classes of colour and of shape that a Gaussian may have. A class is below 0 if class 0 is too
-/// coarse.
-fn coarsest(parameters: &Parameters, geometry: &Geometry, placed: MortonKey) -> [f32; 2] {
+/// Returns the coarsest classes that a Gaussian may have. A class is below 0 if class 0 is too coarse.
+fn coarsest(parameters: &Parameters, geometry: &Geometry, placed: MortonKey) -> ColourAndShape<f32> {
     let g = canonical(geometry, placed.index());
     if g.log_opacity < VISIBLE {
-        return [f32::from(LAST_CLASS); 2];
+        let last = f32::from(LAST_CLASS);
+        return ColourAndShape { colour: last, shape: last };
     }
     let steps = rotation_steps(parameters.rotation_steps(g.scales), g.scales);
     let [a, b] = if least_axis(g.scales) == 0 { [1, 2] } else { [0, 1] };
@@ -128,7 +132,7 @@ fn coarsest(parameters: &Parameters, geometry: &Geometry, placed: MortonKey) -> 
     let steps = parameters.position_steps(g.scales);
     let positions = (0..3).map(|k| steps[k] / exp(g.scales[k.min(1)])).fold(0.0, f32::max) / POSITION_STEP;
     let shape = logs_over(parameters).max(turns).max(positions);
-    [colour_over(parameters), shape].map(|over| (EXACT - log2(over)).floor())
+    ColourAndShape { colour: colour_over(parameters), shape }.map(|over| (EXACT - log2(over)).floor())
 }
 
 /// Returns the step of the base colour at colour class 0 over its limit.
@@ -139,7 +143,7 @@ fn colour_over(parameters: &Parameters) -> f32 {
 /// Returns the largest of the steps of the opacity and the two larger scales at shape class 0, over the limit.
 fn logs_over(parameters: &Parameters) -> f32 {
     let [_, _, opacity, first, second, _] = parameters.factors;
-    parameters.base[1] * opacity.max(first).max(second) / LOG_STEP
+    parameters.base.shape * opacity.max(first).max(second) / LOG_STEP
 }
 
 #[cfg(test)]
@@ -159,7 +163,7 @@ mod tests {
         packed.unpack().unwrap().into_splats()
     }
 
-    /// Returns the weights of views that saw every fifth Gaussian. Moving and turning a Gaussian hardly shows in them.
+    /// Returns the sensitivity of views that saw every fifth Gaussian. Moving and turning a Gaussian hardly shows in them.
     fn misleading(splats: &Splats) -> Sensitivity {
         let mut s = Sensitivity::guess(&splats.geometry);
         for i in 0..splats.len() {

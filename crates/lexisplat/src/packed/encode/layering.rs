@@ -6,11 +6,9 @@ use super::options::PackOptions;
 use crate::packed::bitstream::index::MAX_LAYERS;
 use crate::packed::bitstream::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
-/// Least number of Gaussians of a scene with two layers, by default. Smaller scenes have small files.
-pub(in crate::packed) const LEAST_LAYERED: usize = 8000;
 /// Share of the Gaussians that are not in the last layer, for scenes with several layers.
 const COARSE_SHARE: f64 = 0.14;
-/// Share of the Gaussians of a first layer that stay in it when it is divided in two, for levels of detail.
+/// Share of the Gaussians of a first layer that stay in it when it is divided in two, for refinements of detail.
 const DIVIDED_SHARE: f64 = 0.2;
 /// Power of the energy to which the probability of a layer is proportional. The energy of a Gaussian is the squared change
 /// of pictures without it. With a power of 1 the Gaussians that show most would stand alone, with holes between them
@@ -25,11 +23,11 @@ pub(crate) const MOST_CHUNK: usize = 32_768;
 const CHUNKS: usize = 6;
 /// A remainder of a layer of up to `1 / REST` of a chunk joins the last chunk.
 const REST: usize = 2;
-/// Smallest size of a nonzero in each part of SH-rest, in steps, for scenes with several layers.
-const PARTS: [u32; 3] = [12, 6, 1];
+/// Smallest size of a nonzero in each SH part, in steps, for scenes with several layers.
+const SH_PARTS: [u32; 3] = [12, 6, 1];
 /// Number of refinements of the first layer and of each other layer, for scenes with several layers.
-const FIRST_LEVELS: u8 = 2;
-const LEVELS: u8 = 1;
+const FIRST_REFINEMENTS: u8 = 2;
+const REFINEMENTS: u8 = 1;
 
 /// The layers of a file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -96,11 +94,11 @@ impl Layering {
         self.factors.len() + 1
     }
 
-    /// Returns the form of each layer, with `parts` parts of SH-rest.
-    pub(in crate::packed) fn forms(&self, parts: usize) -> Vec<LayerForm> {
-        let mut levels = vec![LEVELS; self.layers()];
-        levels[0] = if self.layers() > 1 { FIRST_LEVELS } else { 0 };
-        layer_forms(&levels, parts, self.layers() > 1)
+    /// Returns the form of each layer, with `sh_parts` SH parts.
+    pub(in crate::packed) fn forms(&self, sh_parts: usize) -> Vec<LayerForm> {
+        let mut refinements = vec![REFINEMENTS; self.layers()];
+        refinements[0] = if self.layers() > 1 { FIRST_REFINEMENTS } else { 0 };
+        layer_forms(&refinements, sh_parts, self.layers() > 1)
     }
 
     /// Returns the probability with which a Gaussian that is in no earlier layer is drawn into `layer`.
@@ -120,16 +118,16 @@ impl Layering {
         let least = match self.layers() {
             _ if dim == 0 => Vec::new(),
             1 => vec![1],
-            _ => PARTS.to_vec(),
+            _ => SH_PARTS.to_vec(),
         };
         RestForm { dim, atoms, least }
     }
 
-    /// Returns the order of the ranges of `chunks` in the data. Each chunk has `parts` parts of SH-rest, and `energies`
+    /// Returns the order of the ranges of `chunks` in the data. Each chunk has `sh_parts` SH parts, and `energies`
     /// holds the sum of its Gaussians' energies.
-    pub(in crate::packed) fn order(&self, chunks: &[Chunk], energies: &[f64], parts: usize) -> Vec<Place> {
-        let forms = self.forms(parts);
-        let mut order = Order { parts, order: Vec::new(), finer: vec![0; chunks.len()] };
+    pub(in crate::packed) fn order(&self, chunks: &[Chunk], energies: &[f64], sh_parts: usize) -> Vec<Place> {
+        let forms = self.forms(sh_parts);
+        let mut order = Order { sh_parts, order: Vec::new(), finer: vec![0; chunks.len()] };
         let of = |layer: usize| (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
         // The first layer comes as a whole, one kind of range after the other. Other layers come chunk by chunk, in falling
         // order of energy over bytes of the base.
@@ -149,7 +147,7 @@ impl Layering {
                     kind(&mut order, c, *form);
                 }
                 there[c] = true;
-                // As soon as the chunks around an earlier chunk are there, that chunk is refined by one level.
+                // As soon as the chunks around an earlier chunk are there, that chunk gets one more refinement.
                 for before in (0..chunks.len()).filter(|&b| chunks[b].layer < layer) {
                     if !there[before] && overlapping(chunks, before, layer).all(|c| there[c]) {
                         order.finer(before, forms[chunks[before].layer]);
@@ -159,16 +157,16 @@ impl Layering {
             }
         }
         // The remaining ranges of all layers follow: middle nonzeros, remaining refinements, smallest nonzeros.
-        let last = parts.saturating_sub(1);
-        for part in 1..last {
-            (0..chunks.len()).for_each(|c| order.part(c, forms[chunks[c].layer], part));
+        let last = sh_parts.saturating_sub(1);
+        for sh_part in 1..last {
+            (0..chunks.len()).for_each(|c| order.sh_part(c, forms[chunks[c].layer], sh_part));
         }
         for c in 0..chunks.len() {
             let form = forms[chunks[c].layer];
             while order.finer(c, form) {}
         }
         if last > 0 {
-            (0..chunks.len()).for_each(|c| order.part(c, forms[chunks[c].layer], last));
+            (0..chunks.len()).for_each(|c| order.sh_part(c, forms[chunks[c].layer], last));
         }
         order.order
     }
@@ -176,7 +174,7 @@ impl Layering {
 
 /// An order of ranges under construction.
 struct Order {
-    parts: usize,
+    sh_parts: usize,
     order: Vec<Place>,
     /// Number of refinements of each chunk that are in the order.
     finer: Vec<usize>,
@@ -199,23 +197,23 @@ impl Order {
     }
 
     fn largest(&mut self, chunk: usize, form: LayerForm) {
-        if self.parts > 0 {
-            self.part(chunk, form, 0);
+        if self.sh_parts > 0 {
+            self.sh_part(chunk, form, 0);
         }
     }
 
-    fn part(&mut self, chunk: usize, form: LayerForm, part: usize) {
-        self.put(chunk, 1 + form.levels + part);
+    fn sh_part(&mut self, chunk: usize, form: LayerForm, sh_part: usize) {
+        self.put(chunk, 1 + form.refinements + sh_part);
     }
 
     /// Adds the next refinement of `chunk`. Returns whether there was one.
     fn finer(&mut self, chunk: usize, form: LayerForm) -> bool {
-        let level = self.finer[chunk];
-        if level < form.levels {
-            self.put(chunk, 1 + level);
+        let next = self.finer[chunk];
+        if next < form.refinements {
+            self.put(chunk, 1 + next);
             self.finer[chunk] += 1;
         }
-        level < form.levels
+        next < form.refinements
     }
 }
 

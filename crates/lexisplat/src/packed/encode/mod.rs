@@ -1,6 +1,5 @@
 //! The encoder: from a scene and its sensitivity to a packed scene of any quality.
 
-pub(in crate::packed) mod alone;
 pub(in crate::packed) mod appearance;
 pub(in crate::packed) mod canonical;
 pub(in crate::packed) mod codebook;
@@ -8,6 +7,7 @@ pub(in crate::packed) mod coder;
 pub(in crate::packed) mod encoding;
 pub(in crate::packed) mod fit;
 pub(in crate::packed) mod floor;
+pub(in crate::packed) mod interim;
 pub(in crate::packed) mod layering;
 pub(in crate::packed) mod neighbours;
 pub(in crate::packed) mod octaves;

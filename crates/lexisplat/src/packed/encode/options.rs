@@ -2,12 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::layering::LEAST_LAYERED;
 use crate::scene::splats::all_finite;
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 
+/// Least number of Gaussians of a scene with two layers, by default. Smaller scenes have small files.
+const LEAST_LAYERED: usize = 8000;
 /// Most Gaussians of the first layer, with levels of detail, for [`PackOptions::lod`]. The number was chosen, not
 /// measured: the layer is about half a megabyte.
 pub const LOD_FIRST_LAYER: usize = 65_536;
@@ -23,19 +24,20 @@ pub struct PackOptions {
     pub atoms: Option<usize>,
     /// Stores the place of each Gaussian in the source. Then no Gaussian is left out.
     pub keep_order: bool,
-    /// Leaves no Gaussian out, and keeps base colours and opacities. A tolerance does so too.
+    /// Leaves no Gaussian out, and keeps base colours and opacities. A tolerance has the same effect.
     pub keep_all: bool,
     /// Seed of the learning sample.
     pub seed: u64,
     /// Up to 15 points from which the scene is seen. The file then holds the base colours that are seen from these points
     /// on average, so that colours are right without SH-rest too.
-    pub viewpoints: Vec<[f32; 3]>,
+    pub points_of_view: Vec<[f32; 3]>,
     /// Least number of Gaussians of a scene with two layers. The first layer draws the whole scene coarsely. Smaller scenes
     /// have one layer. Default 8,000; `usize::MAX` for one layer always.
     pub layers_from: usize,
-    /// Most Gaussians of the first layer, with levels of detail. A scene then has more layers, each of about five times as
-    /// many Gaussians as the layers before it, so that readers draw what is far with few Gaussians
-    /// ([`Outline::select`](crate::packed::Outline::select)). docs/results/lod.md has their bytes. Default `None`: two layers.
+    /// Most Gaussians of the first layer, with levels of detail. A scene then has more layers, each of about five times
+    /// as many Gaussians as the layers before it, so that readers draw distant Gaussians from few layers
+    /// ([`Outline::select`](crate::packed::Outline::select)). docs/results/lod.md has their bytes. Default `None`: two
+    /// layers.
     pub lod: Option<usize>,
 }
 
@@ -47,7 +49,7 @@ impl Default for PackOptions {
             keep_order: false,
             keep_all: false,
             seed: 0,
-            viewpoints: Vec::new(),
+            points_of_view: Vec::new(),
             layers_from: LEAST_LAYERED,
             lod: None,
         }
@@ -61,7 +63,7 @@ impl PackOptions {
         with_keep_order(keep_order: bool),
         with_keep_all(keep_all: bool),
         with_seed(seed: u64),
-        with_viewpoints(viewpoints: Vec<[f32; 3]>),
+        with_points_of_view(points_of_view: Vec<[f32; 3]>),
         with_layers_from(layers_from: usize),
         with_lod(lod: impl Into<Option<usize>>),
     );
@@ -85,7 +87,7 @@ impl PackOptions {
         if self.lod == Some(0) {
             return Err(Error::parameter("lod", 0, "at least 1 Gaussian in the first layer"));
         }
-        all_finite([("viewpoints", self.viewpoints.as_flattened())])?;
+        all_finite([("points_of_view", self.points_of_view.as_flattened())])?;
         if let Some(tol) = self.tolerance
             && (!tol.is_finite() || tol <= 0.0)
         {

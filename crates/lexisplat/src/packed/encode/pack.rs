@@ -6,8 +6,8 @@ use super::fit::Fit;
 use super::floor::Floor;
 use super::options::PackOptions;
 use super::quantised::{Fitted, Gaussians, Quantised};
-use super::removal::Weights;
-use crate::packed::bitstream::MeanView;
+use super::removal::Influence;
+use crate::packed::bitstream::PointsOfView;
 use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::curve::{Grid, MortonKey};
 use crate::packed::scene::Packed;
@@ -34,44 +34,44 @@ const MOST_DB: f64 = 100.0;
 pub struct Packer<S> {
     splats: S,
     options: PackOptions,
-    scene: Vec<MortonKey>,
+    keys: Vec<MortonKey>,
     fit: Fit,
-    mean_view: MeanView,
+    points_of_view: PointsOfView,
     /// The base colours that the file holds, by index in `splats`.
     dc: Vec<[f32; 3]>,
-    weights: Weights,
+    influence: Influence,
 }
 
 impl<S: Borrow<Splats>> Packer<S> {
     /// Prepares `splats`. `sensitivity` says how much pictures depend on each value of each Gaussian.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values or weights that
-    /// are not finite.
+    /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values or sensitivities that are
+    /// not finite.
     pub fn new(splats: S, sensitivity: &Sensitivity, options: &PackOptions) -> Result<Self> {
         check(splats.borrow(), sensitivity)?;
         options.check()?;
         let g = &splats.borrow().geometry;
         let grid = Grid::fit(&g.positions);
-        let mut scene = grid.keys(g);
-        scene.sort_unstable();
-        let mean_view = MeanView::new(&options.viewpoints);
-        let dc = mean_view.colours(splats.borrow());
-        let fit = Fit::new(g, &dc, sensitivity, &scene, &grid);
-        let weights = Weights::new(g, sensitivity, &scene, options.may_change());
-        Ok(Self { splats, options: options.clone(), scene, fit, mean_view, dc, weights })
+        let mut keys = grid.keys(g);
+        keys.sort_unstable();
+        let points_of_view = PointsOfView::new(&options.points_of_view);
+        let dc = points_of_view.colours(splats.borrow());
+        let fit = Fit::new(g, &dc, sensitivity, &keys, &grid);
+        let influence = Influence::new(g, sensitivity, &keys, options.may_change());
+        Ok(Self { splats, options: options.clone(), keys, fit, points_of_view, dc, influence })
     }
 
     /// Returns the number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.scene.len()
+        self.keys.len()
     }
 
     /// Returns whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.scene.is_empty()
+        self.keys.is_empty()
     }
 
     /// Returns the overall step at which pictures are expected to have a PSNR of `decibels`, in dB. Errors of all Gaussians
@@ -107,19 +107,21 @@ impl<S: Borrow<Splats>> Packer<S> {
             return Err(Error::parameter("step", step, "a finite number above 0"));
         }
         let parameters = self.fit.steps.with_step(step);
-        let kept = self.weights.kept(step);
-        let scene: Vec<MortonKey> = kept.iter().map(|&i| self.scene[i]).collect();
-        let classes: Vec<[f32; 2]> = kept.iter().map(|&i| self.fit.classes[i]).collect();
-        let weights = kept.iter().map(|&i| self.weights.shown[i]).collect();
+        let kept = self.influence.kept(step);
+        let keys: Vec<MortonKey> = kept.iter().map(|&i| self.keys[i]).collect();
+        let classes: Vec<_> = kept.iter().map(|&i| self.fit.classes[i]).collect();
+        let sensitivities = kept.iter().map(|&i| self.influence.sensitivities[i]).collect();
         let geometry = &self.splats.borrow().geometry;
         let floor = match floor {
-            true => Floor::new(parameters, geometry, &scene),
+            true => Floor::new(parameters, geometry, &keys),
             false => Floor::none(parameters),
         };
-        let classes = floor.classes(&classes, geometry, &scene);
-        let gaussians = Gaussians { scene, classes, weights };
-        let fitted =
-            Fitted { most_dc: most_dc(&floor.parameters, &self.dc), mean_view: self.mean_view.clone() };
+        let classes = floor.classes(&classes, geometry, &keys);
+        let gaussians = Gaussians { keys, classes, sensitivities };
+        let fitted = Fitted {
+            most_dc: most_dc(&floor.parameters, &self.dc),
+            points_of_view: self.points_of_view.clone(),
+        };
         Quantised::new(self.splats.borrow(), &self.options, gaussians, floor.parameters, fitted, progress)
     }
 }
@@ -150,14 +152,14 @@ pub(crate) fn expected_step(gaussians: usize, decibels: f64) -> f64 {
 pub(crate) fn check(splats: &Splats, sensitivity: &Sensitivity) -> Result<()> {
     splats.validate()?;
     Limits::check("Gaussians", splats.len() as u64, MAX_GAUSSIANS)?;
-    let weights = [
+    let all = [
         (sensitivity.colour.len(), sensitivity.colour.as_slice()),
         (sensitivity.opacity.len(), &sensitivity.opacity),
         (sensitivity.position.len(), sensitivity.position.as_flattened()),
         (sensitivity.scale.len(), sensitivity.scale.as_flattened()),
         (sensitivity.rotation.len(), sensitivity.rotation.as_flattened()),
     ];
-    for (len, values) in weights {
+    for (len, values) in all {
         if len != splats.len() {
             let expected = format!("{} entries, one a Gaussian", splats.len());
             return Err(Error::parameter("sensitivity", len, expected));

@@ -2,21 +2,22 @@
 
 use std::ops::Range;
 
-use super::alone::Alone;
 use super::appearance::{Appearance, AppearanceChange};
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, OrderedGaussians, too_large};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written};
+use super::interim::InterimChanges;
 use super::layering::Layering;
 use super::options::PackOptions;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
-use crate::packed::bitstream::parameters::Parameters;
-use crate::packed::bitstream::{CodedChunk, MeanView};
+use crate::packed::bitstream::parameters::{ColourAndShape, Parameters};
+use crate::packed::bitstream::{CodedChunk, PointsOfView};
 use crate::packed::curve::MortonKey;
 use crate::packed::decode::reorder::gather;
 use crate::packed::entropy::tables::Tables;
 use crate::packed::scene::Packed;
 use crate::scene::extra::{Extra, for_extra};
+use crate::scene::sensitivity::AppearanceSensitivity;
 use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
 use crate::sparse::tally::{CompressReport, Tally};
@@ -28,35 +29,33 @@ use crate::support::stopwatch::Stopwatch;
 
 /// A function that fits the base colours and opacities of a part of a scene to pictures of the part.
 ///
-/// Its arguments are the part, the model that the file has of it, and for each Gaussian of the model the sensitivities to
-/// its colour and to the logarithm of its opacity. It returns one appearance for each Gaussian of the model, or `None` to
-/// leave them as they are.
+/// Its arguments are the part, the model that the file has of it, and the sensitivity to the appearance of each Gaussian
+/// of the model. It returns one appearance for each Gaussian of the model, or `None` to leave them as they are.
 pub type Refit<'a, E = Error> =
-    dyn FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>, E> + 'a;
+    dyn FnMut(&Splats, &Model, &[AppearanceSensitivity]) -> Result<Option<Vec<Appearance>>, E> + 'a;
 
 /// The Gaussians of a file. All lists have the same order.
 #[derive(Debug, Default)]
 pub(in crate::packed) struct Gaussians {
     /// The cell of each Gaussian, and its index in the source.
-    pub(in crate::packed) scene: Vec<MortonKey>,
-    /// The colour class and the shape class of each Gaussian.
-    pub(in crate::packed) classes: Vec<[u8; 2]>,
-    /// The sensitivities of each Gaussian to its colour and to the logarithm of its opacity.
-    pub(in crate::packed) weights: Vec<[f32; 2]>,
+    pub(in crate::packed) keys: Vec<MortonKey>,
+    pub(in crate::packed) classes: Vec<ColourAndShape<u8>>,
+    /// The sensitivity to the appearance of each Gaussian.
+    pub(in crate::packed) sensitivities: Vec<AppearanceSensitivity>,
 }
 
 impl Gaussians {
     /// Sorts the Gaussians by layer. Within a layer they stay in the order of cells. Returns the number of Gaussians of
     /// each layer.
     pub(in crate::packed) fn in_layers(&mut self, layering: &mut Layering) -> Vec<usize> {
-        let layers: Vec<usize> = self.weights.iter().map(|w| layering.layer(w[1])).collect();
+        let layers: Vec<usize> = self.sensitivities.iter().map(|s| layering.layer(s.opacity)).collect();
         let layers = &layers;
         let of = |layer: usize| (0..layers.len()).filter(move |&i| layers[i] == layer);
         let count = layering.layers();
         let order: Vec<usize> = (0..count).flat_map(&of).collect();
-        gather(&mut self.scene, order.iter().copied());
+        gather(&mut self.keys, order.iter().copied());
         gather(&mut self.classes, order.iter().copied());
-        gather(&mut self.weights, order.iter().copied());
+        gather(&mut self.sensitivities, order.iter().copied());
         (0..count).map(|layer| of(layer).count()).collect()
     }
 }
@@ -66,7 +65,15 @@ impl Gaussians {
 pub(in crate::packed) struct Fitted {
     /// The largest coordinate of usual base colours.
     pub(in crate::packed) most_dc: f64,
-    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) points_of_view: PointsOfView,
+}
+
+/// A chunk of a file.
+#[derive(Debug)]
+struct ChunkRows {
+    layer: usize,
+    /// Its Gaussians, by their index in the file.
+    rows: Range<usize>,
 }
 
 /// A scene that is quantised with one overall step. The Gaussians that stay, the steps, the dictionary and the codes are
@@ -77,12 +84,11 @@ pub struct Quantised<'a> {
     splats: &'a Splats,
     options: &'a PackOptions,
     gaussians: Gaussians,
-    /// The layer of each chunk, and its Gaussians.
-    chunks: Vec<(usize, Range<usize>)>,
+    chunks: Vec<ChunkRows>,
     /// The codes of each chunk.
     codes: Vec<Codes>,
     /// The interim changes of all layers but the last.
-    alone: Alone,
+    interim: InterimChanges,
     encoding: Encoding,
 }
 
@@ -92,14 +98,14 @@ impl<'a> Quantised<'a> {
         options: &'a PackOptions,
         gaussians: Gaussians,
         parameters: Parameters,
-        Fitted { most_dc, mean_view }: Fitted,
+        Fitted { most_dc, points_of_view }: Fitted,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let n = gaussians.scene.len();
-        let layering = Layering::new(n, options, gaussians.weights.iter().map(|w| (w[1], 1)));
-        let view = OrderedGaussians::new(splats, &gaussians.scene, &gaussians.classes);
+        let n = gaussians.keys.len();
+        let layering = Layering::new(n, options, gaussians.sensitivities.iter().map(|s| (s.opacity, 1)));
+        let ordered = OrderedGaussians::new(splats, &gaussians.keys, &gaussians.classes);
         let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(view, parameters, mean_view, options, progress)?;
+        let coder = ChunkCoder::new(ordered, parameters, points_of_view, options, progress)?;
         let encoding = Encoding::new(coder, layering, most_dc, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);
@@ -124,19 +130,19 @@ impl<'a> Quantised<'a> {
             let end = start + count;
             while start < end {
                 let next = start + encoding.layering.next_chunk(layer, end - start);
-                chunks.push((layer, start..next));
+                chunks.push(ChunkRows { layer, rows: start..next });
                 start = next;
             }
         }
         let probability =
-            |layer: usize, i: usize| encoding.layering.probability(layer, gaussians.weights[i][1]);
-        let alone = Alone::new(&splats.geometry, &gaussians.scene, &counts, probability);
-        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), alone, encoding };
-        let view = part.view(None)?;
-        let codes = part.chunks.iter().map(|(_, range)| {
+            |layer: usize, i: usize| encoding.layering.probability(layer, gaussians.sensitivities[i].opacity);
+        let interim = InterimChanges::new(&splats.geometry, &gaussians.keys, &counts, probability);
+        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), interim, encoding };
+        let ordered = part.ordered(None)?;
+        let codes = part.chunks.iter().map(|ChunkRows { rows, .. }| {
             progress.check()?;
-            let codes = part.encoding.coder.codes(view.part(range.clone()));
-            progress.advance(range.len() as u64);
+            let codes = part.encoding.coder.codes(ordered.slice(rows.clone()));
+            progress.advance(rows.len() as u64);
             Ok(codes)
         });
         part.codes = codes.collect::<Result<_>>()?;
@@ -146,25 +152,24 @@ impl<'a> Quantised<'a> {
     /// Returns the number of Gaussians of the file.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.gaussians.scene.len()
+        self.gaussians.keys.len()
     }
 
     /// Returns whether the file has no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.gaussians.scene.is_empty()
+        self.gaussians.keys.is_empty()
     }
 
-    /// Returns the sensitivities of each Gaussian to its colour and to the logarithm of its opacity, in the order of the
-    /// file.
+    /// Returns the sensitivity to the appearance of each Gaussian, in the order of the file.
     #[must_use]
-    pub fn weights(&self) -> &[[f32; 2]] {
-        &self.gaussians.weights
+    pub fn sensitivities(&self) -> &[AppearanceSensitivity] {
+        &self.gaussians.sensitivities
     }
 
     /// Makes the file. `appearances` replaces the scene's own base colours and opacities, with one entry for each Gaussian
     /// in the order of the file. `changes` are the interim changes of the Gaussians of the first layer, for the time while
-    /// the second layer is missing. They are relative to what [`Packed::first_layer`] shows.
+    /// the second layer is missing. They are relative to the scene of [`Packed::first_layer`].
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are more or fewer entries than Gaussians, if values are not finite, if an opacity is
@@ -176,27 +181,25 @@ impl<'a> Quantised<'a> {
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
         let n = self.len();
-        let view = OrderedGaussians { changes, ..self.view(appearances)? };
+        let ordered = OrderedGaussians { changes, ..self.ordered(appearances)? };
         changes.unwrap_or_default().iter().try_for_each(AppearanceChange::check)?;
         let mut encoding = self.encoding.clone();
         // The counting pass runs first, because the tables must be known before any symbol is coded. Keeping all symbols in
         // memory would take more than the scene's geometry.
-        let counted = self.each_chunk(view, progress, |_, tally, coded| {
-            Counts::of(tally, coded.ranges.iter().map(|(range, _)| range))
-        });
+        let counted = self.each_chunk(ordered, progress, |_, tally, coded| Counts::of(tally, &coded.ranges));
         for chunk in counted {
             encoding.counts.add(&chunk?);
         }
         let mut code_chunks = |tables: &Tables, write: &mut WriteChunk<'_>| {
-            let parts =
-                self.each_chunk(view, progress, |layer, _, coded| Written::new(layer, &coded, tables));
-            parts.into_iter().try_for_each(|part| write(part?))
+            let written =
+                self.each_chunk(ordered, progress, |layer, _, coded| Written::new(layer, &coded, tables));
+            written.into_iter().try_for_each(|chunk| write(chunk?))
         };
         let meta = self.splats.meta.clone();
         let Finished { mut head, data, report } =
             encoding.finish(n, self.options, meta, SpillTo::Memory, &mut code_chunks)?;
         head.removed = (self.splats.len() - n) as u64;
-        let order = self.options.keep_order.then(|| self.gaussians.scene.iter().map(|g| g.source).collect());
+        let order = self.options.keep_order.then(|| self.gaussians.keys.iter().map(|g| g.source).collect());
         Ok((Packed::new(head, self.extras(0..n), order, data.into_bytes()?), report))
     }
 
@@ -209,8 +212,8 @@ impl<'a> Quantised<'a> {
     ) -> Result<(Counts, Vec<(usize, CodedChunk)>)> {
         let mut counts = Counts::of(Tally::new(self.encoding.coder.dictionary.dim()), []);
         let mut chunks = Vec::with_capacity(self.chunks.len());
-        let all = self.each_chunk(self.view(appearances)?, progress, |layer, tally, coded| {
-            let counts = Counts::of(tally, coded.ranges.iter().map(|(range, _)| range));
+        let all = self.each_chunk(self.ordered(appearances)?, progress, |layer, tally, coded| {
+            let counts = Counts::of(tally, &coded.ranges);
             (counts, (layer, coded))
         });
         for chunk in all {
@@ -222,7 +225,7 @@ impl<'a> Quantised<'a> {
     }
 
     /// Returns the Gaussians with these appearances, or with their own. Refuses appearances as [`Self::finish`] says.
-    pub(in crate::packed) fn view<'v>(
+    pub(in crate::packed) fn ordered<'v>(
         &'v self,
         appearances: Option<&'v [Appearance]>,
     ) -> Result<OrderedGaussians<'v>> {
@@ -233,47 +236,47 @@ impl<'a> Quantised<'a> {
             }
             all.iter().try_for_each(Appearance::check)?;
         }
-        let Gaussians { scene, classes, .. } = &self.gaussians;
-        Ok(OrderedGaussians { appearances, ..OrderedGaussians::new(self.splats, scene, classes) })
+        let Gaussians { keys, classes, .. } = &self.gaussians;
+        Ok(OrderedGaussians { appearances, ..OrderedGaussians::new(self.splats, keys, classes) })
     }
 
-    /// Calls `with` for each chunk of `view`, with its layer, the counts of its codes and its symbols. Returns the results
-    /// in the order of chunks.
+    /// Calls `with` for each chunk of `ordered`, with its layer, the counts of its codes and its symbols. Returns the
+    /// results in the order of chunks.
     fn each_chunk<T: Send>(
         &self,
-        view: OrderedGaussians<'_>,
+        ordered: OrderedGaussians<'_>,
         progress: &dyn Progress,
         with: impl Fn(usize, Tally, CodedChunk) -> T + Sync,
     ) -> Vec<Result<T>> {
         let Encoding { form, head, .. } = &self.encoding;
         let forms = self.encoding.layering.forms(head.rest.least.len());
-        self.each_target(view, progress, |layer, tally, targets| {
+        self.each_target(ordered, progress, |layer, tally, targets| {
             let layer_form = forms.get(layer).copied().unwrap_or_default();
             let coded = form.record(&head.frame, layer_form, &targets).ok_or_else(too_large)?;
             Ok(with(layer, tally, coded))
         })
     }
 
-    /// Calls `with` for each chunk of `view`, with its layer, the counts of its codes and its targets. Returns the results
-    /// in the order of chunks.
+    /// Calls `with` for each chunk of `ordered`, with its layer, the counts of its codes and its targets. Returns the
+    /// results in the order of chunks.
     pub(in crate::packed) fn each_target<T: Send>(
         &self,
-        view: OrderedGaussians<'_>,
+        ordered: OrderedGaussians<'_>,
         progress: &dyn Progress,
         with: impl Fn(usize, Tally, Vec<CodedGaussian>) -> Result<T> + Sync,
     ) -> Vec<Result<T>> {
         let coder = &self.encoding.coder;
         let unit = self.encoding.head.dc_unit();
-        map_vec(self.chunks.iter().zip(&self.codes).collect(), |((layer, range), codes)| {
+        map_vec(self.chunks.iter().zip(&self.codes).collect(), |(ChunkRows { layer, rows }, codes)| {
             progress.check()?;
-            let (tally, mut targets) = coder.targets(view.part(range.clone()), codes, unit)?;
-            for (i, target) in range.clone().zip(&mut targets) {
-                target.energy = self.gaussians.weights[i][1];
-                if !self.alone.has(*layer) {
+            let (tally, mut targets) = coder.targets(ordered.slice(rows.clone()), codes, unit)?;
+            for (i, target) in rows.clone().zip(&mut targets) {
+                target.energy = self.gaussians.sensitivities[i].opacity;
+                if !self.interim.has(*layer) {
                     continue;
                 }
-                let change = view.changes.and_then(|changes| changes.get(i));
-                target.interim = self.alone.steps(i, change, &coder.parameters);
+                let change = ordered.changes.and_then(|changes| changes.get(i));
+                target.interim = self.interim.steps(i, change, &coder.parameters);
             }
             with(*layer, tally, targets)
         })
@@ -282,18 +285,18 @@ impl<'a> Quantised<'a> {
     /// Returns the number of Gaussians of each layer.
     pub(in crate::packed) fn layer_counts(&self) -> Vec<usize> {
         let mut counts = vec![0; self.encoding.layering.layers()];
-        self.chunks.iter().for_each(|(layer, range)| counts[*layer] += range.len());
+        self.chunks.iter().for_each(|chunk| counts[chunk.layer] += chunk.rows.len());
         counts
     }
 
     /// Returns the cell of each Gaussian and its index in the source, in the order of the file.
     pub(in crate::packed) fn sources(&self) -> &[MortonKey] {
-        &self.gaussians.scene
+        &self.gaussians.keys
     }
 
-    /// Returns the properties that 3DGS does not define, for the Gaussians `range` in the order of the file.
-    pub(in crate::packed) fn extras(&self, range: Range<usize>) -> Vec<Extra> {
-        let sources = &self.gaussians.scene[range];
+    /// Returns the properties that 3DGS does not define, for the Gaussians `rows` in the order of the file.
+    pub(in crate::packed) fn extras(&self, rows: Range<usize>) -> Vec<Extra> {
+        let sources = &self.gaussians.keys[rows];
         let mut extras = self.splats.geometry.extras.clone();
         for extra in &mut extras {
             for_extra!(&mut extra.values, v => gather(v, sources.iter().map(|g| g.index())));
@@ -312,7 +315,7 @@ impl<'a> Quantised<'a> {
             return Ok(None);
         };
         let model = self.finish(None, None, progress)?.0.unpack()?;
-        refit(self.splats, &model, self.weights())
+        refit(self.splats, &model, self.sensitivities())
     }
 }
 
@@ -357,7 +360,7 @@ mod tests {
         let options = PackOptions::default();
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
-        assert_eq!((quantised.len(), quantised.weights().len(), quantised.is_empty()), (50, 50, false));
+        assert_eq!((quantised.len(), quantised.sensitivities().len(), quantised.is_empty()), (50, 50, false));
         let refused =
             |shown: &[Appearance]| quantised.finish(Some(shown), None, &Silent).unwrap_err().to_string();
         let good = Appearance { dc: [0.0; 3], log_opacity: -1.0 };

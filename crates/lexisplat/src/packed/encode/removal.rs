@@ -1,7 +1,7 @@
-//! Which Gaussians a packed file leaves out.
+//! The choice of the Gaussians that a packed file leaves out.
 
 use crate::packed::curve::MortonKey;
-use crate::scene::sensitivity::Sensitivity;
+use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity};
 use crate::scene::splats::Geometry;
 use crate::support::maths::log_sigmoid;
 
@@ -58,26 +58,26 @@ pub(in crate::packed) fn is_worth_its_bits(change: f32, step: f64) -> bool {
 
 /// The dependence of pictures on each Gaussian as a whole.
 #[derive(Debug)]
-pub(in crate::packed) struct Weights {
-    /// The sensitivities of each Gaussian to its colour and to the logarithm of its opacity.
-    pub(in crate::packed) shown: Vec<[f32; 2]>,
+pub(in crate::packed) struct Influence {
+    /// The sensitivity to the appearance of each Gaussian.
+    pub(in crate::packed) sensitivities: Vec<AppearanceSensitivity>,
     /// The result of [`changes_without`] for each Gaussian.
     left_out: Vec<f32>,
 }
 
-impl Weights {
-    /// Computes the weights of the Gaussians of `geometry`, in the order of `scene`. None may be left out unless
+impl Influence {
+    /// Computes the influence of the Gaussians of `geometry`, in the order of `keys`. None may be left out unless
     /// `may_change`.
     pub(in crate::packed) fn new(
         geometry: &Geometry,
         sensitivity: &Sensitivity,
-        scene: &[MortonKey],
+        keys: &[MortonKey],
         may_change: bool,
     ) -> Self {
         let left_out = changes_without(geometry, sensitivity, may_change);
         Self {
-            shown: scene.iter().map(|g| sensitivity.appearance(g.index())).collect(),
-            left_out: scene.iter().map(|g| left_out[g.index()]).collect(),
+            sensitivities: keys.iter().map(|g| sensitivity.appearance(g.index())).collect(),
+            left_out: keys.iter().map(|g| left_out[g.index()]).collect(),
         }
     }
 

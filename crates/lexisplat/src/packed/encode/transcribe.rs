@@ -1,8 +1,8 @@
 //! Recoding of the ranges of a chunk with other tables.
 
 use crate::packed::bitstream::chunk::{Form, LayerForm, lanes, sets};
-use crate::packed::bitstream::fill_in::interim;
 use crate::packed::bitstream::geometry_syntax::{GeometrySyntax, Group};
+use crate::packed::bitstream::interim::interim;
 use crate::packed::bitstream::parameters::CHANGES;
 use crate::packed::bitstream::refinement::refine;
 use crate::packed::bitstream::sh_codes::{BLOCK, Rest};
@@ -63,29 +63,29 @@ impl Form {
         let all = ranges.iter().map(|bytes| Transcriber::new(lookup, bytes, lanes));
         let mut all = all.collect::<Option<Vec<Transcriber<'_>>>>()?;
         let (base, finer) = all.split_first_mut()?;
-        let (finer, parts) = finer.split_at_mut_checked(layer.levels)?;
-        let (parts, changed) = parts.split_at_mut_checked(layer.parts)?;
+        let (finer, sh_parts) = finer.split_at_mut_checked(layer.refinements)?;
+        let (sh_parts, changed) = sh_parts.split_at_mut_checked(layer.sh_parts)?;
         let steps = gaussians.div_ceil(lanes);
-        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, layer.levels), Rest::default());
+        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, layer.refinements), Rest::default());
         let mut group = Group::default();
         for (step, set) in sets(gaussians, lanes).enumerate() {
             walk.base(base, set, None, &mut group).ok()?;
             for (k, range) in finer.iter_mut().enumerate() {
-                refine(range, set, &mut group, layer.levels - k).ok()?;
+                refine(range, set, &mut group, layer.refinements - k).ok()?;
             }
             if let Some(range) = changed.first_mut() {
                 interim(range, set, &mut group, &[[0; LANES]; CHANGES]);
             }
             rest.push(set, group.colour);
             if rest.len() == BLOCK || step + 1 == steps {
-                for (part, range) in parts.iter_mut().enumerate() {
-                    rest.part(range, None, &self.rest, part).ok()?;
+                for (sh_part, range) in sh_parts.iter_mut().enumerate() {
+                    rest.sh_part(range, None, &self.rest, sh_part).ok()?;
                 }
                 rest.clear();
             }
             // Symbols of damaged ranges may take no bytes. Without this check, recording them would not end.
             let good = |range: &Transcriber<'_>| range.from.check().is_ok();
-            if !(good(base) && finer.iter().chain(&*parts).chain(&*changed).all(good)) {
+            if !(good(base) && finer.iter().chain(&*sh_parts).chain(&*changed).all(good)) {
                 return None;
             }
         }

@@ -1,12 +1,11 @@
-//! Bits with adaptive probabilities, for the parts of a file that are written once: the integers of its head, tables and
+//! Bits with adaptive probabilities, for data that a file has once: the integers of its head, tables and
 //! dictionary.
 //!
 //! They are coded by rANS, as the symbols of a lane are ([`crate::packed::entropy::rans_decoder`]), with tables of two
 //! symbols that change after every bit. All products are below 2^32.
 
 use crate::packed::bitstream::broken::{BrokenHead, must};
-use crate::packed::entropy::rans_encoder::{LEAST as LEAST_STATE, Stack};
-use crate::packed::entropy::tables::Model;
+use crate::packed::entropy::rans_state::{Interval, LEAST as LEAST_STATE, Stack};
 
 /// Number of bits of a probability.
 const PRECISION: u32 = 12;
@@ -104,17 +103,17 @@ impl BitEncoder {
     /// Returns the bytes: words of 16 bits, the first two of which are the state that a decoder starts with.
     pub(in crate::packed) fn finish(self) -> Vec<u8> {
         let mut stack = Stack::new();
-        self.steps.iter().rev().for_each(|&(zero, bit)| stack.symbol(model(zero, bit), PRECISION));
+        self.steps.iter().rev().for_each(|&(zero, bit)| stack.symbol(interval(zero, bit), PRECISION));
         stack.finish().iter().flat_map(|word| word.to_le_bytes()).collect()
     }
 }
 
-/// Returns the range of the low bits of a state that stands for `bit` where 0 has the probability `zero`.
-fn model(zero: u16, bit: bool) -> Model {
+/// Returns the interval of the low bits of a state that stands for `bit` where 0 has the probability `zero`.
+fn interval(zero: u16, bit: bool) -> Interval {
     let zero = u32::from(zero);
     match bit {
-        false => Model { start: 0, share: zero },
-        true => Model { start: zero, share: (1 << PRECISION) - zero },
+        false => Interval { start: 0, share: zero },
+        true => Interval { start: zero, share: (1 << PRECISION) - zero },
     }
 }
 
@@ -156,7 +155,7 @@ impl<'a> BitDecoder<'a> {
         u16::from_le_bytes(word).into()
     }
 
-    /// Returns a broken rule of the part `name` of the head unless an encoder may have written the bytes, and wrote no more
+    /// Returns a broken rule of the block `name` of the head unless an encoder may have written the bytes, and wrote no more
     /// bits than were taken.
     pub(in crate::packed) fn finish(&self, name: &str) -> Result<(), BrokenHead> {
         if let Some(broken) = self.broken {
@@ -171,7 +170,7 @@ impl Bits for BitDecoder<'_> {
     fn split(&mut self, zero: u16, _: bool) -> bool {
         let low = self.state & ((1 << PRECISION) - 1);
         let bit = low >= u32::from(zero);
-        let Model { start, share } = model(zero, bit);
+        let Interval { start, share } = interval(zero, bit);
         self.state = (self.state >> PRECISION) * share + low - start;
         if self.state < LEAST_STATE {
             self.state = self.state << 16 | self.word();

@@ -13,14 +13,21 @@ const COUNT_BITS: usize = 9;
 /// Number of bits of the level of the first symbol.
 const FIRST_BITS: u32 = 5;
 
-/// A table: for each symbol its level, and whether the symbol occurs. The last symbol always occurs. A symbol that does not
-/// occur has the level of the symbol before.
+/// The symbols of a table. The last symbol always occurs.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::packed) struct LogProbabilities(Vec<(u32, bool)>);
+pub(in crate::packed) struct LogProbabilities(Vec<LogProbability>);
 
-/// The adaptive probabilities of the parts of tables.
+/// A symbol of a table.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct LogProbability {
+    /// The level of the symbol. A symbol that does not occur has the level of the symbol before.
+    level: u32,
+    occurs: bool,
+}
+
+/// The adaptive probabilities of the bits of tables.
 #[derive(Debug, Default)]
-pub(in crate::packed) struct LevelBitModels {
+pub(in crate::packed) struct TableBitModels {
     counts: [BitModel; COUNT_BITS + 1],
     /// Whether a symbol occurs, by whether the symbol before does.
     occurs: [BitModel; 2],
@@ -40,30 +47,31 @@ impl LogProbabilities {
     pub(in crate::packed) fn code(
         &self,
         bits: &mut dyn Bits,
-        odds: &mut LevelBitModels,
+        models: &mut TableBitModels,
         precision: u32,
     ) -> Result<Self, BrokenHead> {
-        let count = bits.positive(&mut odds.counts, self.0.len() as u32) as usize;
+        let count = bits.positive(&mut models.counts, self.0.len() as u32) as usize;
         must(count <= MAX_SYMBOLS, || {
             format!("the tables: a table has {count} symbols, above {MAX_SYMBOLS}")
         })?;
-        let mut symbols: Vec<(u32, bool)> = Vec::with_capacity(count);
+        let mut symbols: Vec<LogProbability> = Vec::with_capacity(count);
         for i in 0..count {
-            let (level, occurs) = self.0.get(i).copied().unwrap_or_default();
+            let LogProbability { level, occurs } = self.0.get(i).copied().unwrap_or_default();
             let before = symbols.last().copied();
-            let by = &mut odds.occurs[usize::from(before.is_none_or(|before| before.1))];
+            let by = &mut models.occurs[usize::from(before.is_none_or(|before| before.occurs))];
             let occurs = i + 1 == count || bits.bit(by, occurs);
             let level = match before {
                 None => bits.even(FIRST_BITS, level),
-                Some((before, _)) if !occurs => before,
-                Some((before, _)) => {
-                    let delta = bits.signed(&mut odds.delta, level.cast_signed() - before.cast_signed());
-                    before.checked_add_signed(delta).unwrap_or(u32::MAX)
+                Some(before) if !occurs => before.level,
+                Some(before) => {
+                    let delta =
+                        bits.signed(&mut models.delta, level.cast_signed() - before.level.cast_signed());
+                    before.level.checked_add_signed(delta).unwrap_or(u32::MAX)
                 }
             };
             let most = most_level(precision);
             must(level <= most, || format!("the tables: the level of symbol {i} is not from 0 to {most}"))?;
-            symbols.push((level, occurs));
+            symbols.push(LogProbability { level, occurs });
         }
         Ok(Self(symbols))
     }
@@ -76,13 +84,16 @@ impl LogProbabilities {
             let up = most_level(precision).saturating_sub(level);
             WEIGHTS[(up % LEVELS_PER_OCTAVE) as usize] << (up / LEVELS_PER_OCTAVE)
         };
-        let occurring = self.0.iter().filter(|symbol| symbol.1);
-        let sum: u32 = occurring.clone().map(|symbol| weight(symbol.0)).sum();
+        let occurring = self.0.iter().filter(|symbol| symbol.occurs);
+        let sum: u32 = occurring.clone().map(|symbol| weight(symbol.level)).sum();
         let whole = 1 << precision;
         let free = whole - occurring.count() as u32;
-        let share = |&(level, occurs): &(u32, bool)| if occurs { 1 + weight(level) * free / sum } else { 0 };
+        let share = |symbol: &LogProbability| match symbol.occurs {
+            true => 1 + weight(symbol.level) * free / sum,
+            false => 0,
+        };
         let mut shares: Vec<u32> = self.0.iter().map(share).collect();
-        // The most frequent symbol takes what rounding leaves, since it costs least there.
+        // The most frequent symbol takes the rest of the rounding, which costs least there.
         let left = whole - shares.iter().sum::<u32>();
         let most = (0..shares.len()).max_by_key(|&k| (shares[k], std::cmp::Reverse(k)))?;
         shares[most] += left;
@@ -119,13 +130,13 @@ impl<'a> Fit<'a> {
         let levels = most_level(precision) as usize + 1;
         let octaves = |level: usize| level as f32 / LEVELS_PER_OCTAVE as f32;
         let total: f32 = counts.iter().map(|&count| count as f32).sum();
-        // Probabilities are divided by the sum of all, so the probability at a level takes a part of all others.
-        let part: Vec<f32> = (0..levels)
+        // Probabilities are divided by their sum, so a probability lowers all others. This is its cost in bits.
+        let share: Vec<f32> = (0..levels)
             .map(|level| total * libm::exp2f(-octaves(level)) * std::f32::consts::LOG2_E)
             .collect();
         let own = |&count: &u32| -> Vec<[f32; 2]> {
             let absent = if count == 0 { 0.0 } else { f32::INFINITY };
-            let bits = |level: usize| count as f32 * octaves(level) + part[level];
+            let bits = |level: usize| count as f32 * octaves(level) + share[level];
             (0..levels).map(|level| [absent, bits(level)]).collect()
         };
         let mut fit = Self { counts, levels, bits: counts.iter().map(own).collect() };
@@ -164,11 +175,11 @@ impl<'a> Fit<'a> {
         let all = (0..self.levels)
             .flat_map(|level| [(first[level][0], level, false), (first[level][1], level, true)]);
         let root = all.reduce(|best, next| if next.0 < best.0 { next } else { best }).unwrap_or_default();
-        let mut symbols: Vec<(u32, bool)> = vec![(root.1 as u32, root.2)];
+        let mut symbols = vec![LogProbability { level: root.1 as u32, occurs: root.2 }];
         for i in 1..self.counts.len() {
-            let (level, there) = symbols[i - 1];
-            let (_, level, occurs) = self.choice(i, level as usize, usize::from(there));
-            symbols.push((level as u32, occurs));
+            let before = symbols[i - 1];
+            let (_, level, occurs) = self.choice(i, before.level as usize, usize::from(before.occurs));
+            symbols.push(LogProbability { level: level as u32, occurs });
         }
         let total = f64::from(root.0 + TABLE_BITS)
             - self.counts.iter().map(|&count| f64::from(count)).sum::<f64>() * std::f64::consts::LOG2_E;

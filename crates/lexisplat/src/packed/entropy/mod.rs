@@ -1,4 +1,4 @@
-//! Entropy coding: rANS in lanes for symbols with tables of probabilities, and adaptive bits for what is written once a file.
+//! Entropy coding: rANS in lanes for symbols with tables of probabilities, and adaptive bits for data that a file has once.
 
 #![expect(clippy::cast_possible_truncation, reason = "states, words and frequencies are within limits")]
 #![expect(
@@ -13,6 +13,7 @@ pub(in crate::packed) mod lanes;
 pub(in crate::packed) mod log_probabilities;
 pub(in crate::packed) mod rans_decoder;
 pub(in crate::packed) mod rans_encoder;
+pub(in crate::packed) mod rans_state;
 #[cfg(any(test, feature = "fuzzing"))]
 pub(in crate::packed) mod script;
 pub(in crate::packed) mod shifts;

@@ -4,13 +4,10 @@
 
 use crate::packed::bitstream::streams::Slot;
 use crate::packed::entropy::lanes::{LANES, Lanes, has};
+use crate::packed::entropy::rans_state::{MOST_BITS, Stack};
 use crate::packed::entropy::symbols::Symbols;
-use crate::packed::entropy::tables::{Model, Tables};
+use crate::packed::entropy::tables::Tables;
 
-/// Least state between symbols. An encoder starts each lane with it, and a decoder ends with it.
-pub(in crate::packed) const LEAST: u32 = 1 << 16;
-/// Largest number of raw bits that pass through a state at once.
-pub(in crate::packed) const MOST_BITS: u32 = 16;
 /// Least number of bytes of a range whose lanes count their words in 32 bits. In shorter ranges it is 16 bits.
 const LEAST_LONG: usize = 1 << 17;
 
@@ -30,11 +27,6 @@ pub(in crate::packed) struct SymbolRecorder {
     lanes: [Vec<u32>; LANES],
 }
 
-/// Returns the entry of a symbol.
-fn symbol_entry(context: usize, symbol: u32) -> u32 {
-    (context as u32) << 8 | symbol
-}
-
 impl Symbols for SymbolRecorder {
     fn symbols(
         &mut self,
@@ -46,7 +38,7 @@ impl Symbols for SymbolRecorder {
         let mut out = [0; LANES];
         for l in (0..LANES).filter(|&l| has(set, l)) {
             out[l] = value(l);
-            self.lanes[l].push(symbol_entry(slot.place(context[l]), out[l]));
+            self.lanes[l].push((slot.place(context[l]) as u32) << 8 | out[l]);
         }
         out
     }
@@ -121,48 +113,6 @@ impl SymbolRecorder {
     }
 }
 
-/// The state of a lane, and the words that left it. The coder is a stack: the last symbol that is encoded is the first to be
-/// decoded.
-#[derive(Debug)]
-pub(in crate::packed) struct Stack {
-    state: u32,
-    words: Vec<u16>,
-}
-
-impl Stack {
-    pub(in crate::packed) fn new() -> Self {
-        Self { state: LEAST, words: Vec::new() }
-    }
-
-    /// Moves a word out of the state if it is not below `limit`.
-    fn make_room(&mut self, limit: u64) {
-        if u64::from(self.state) >= limit {
-            self.words.push((self.state & 0xffff) as u16);
-            self.state >>= 16;
-        }
-    }
-
-    /// Encodes a symbol whose probability has `precision` bits.
-    pub(in crate::packed) fn symbol(&mut self, Model { start, share }: Model, precision: u32) {
-        self.make_room(u64::from(share) << (u32::BITS - precision));
-        self.state = ((self.state / share) << precision) + start + self.state % share;
-    }
-
-    /// Encodes `count` raw bits.
-    fn raw(&mut self, count: u32, bits: u32) {
-        self.make_room(1 << (u32::BITS - count));
-        self.state = self.state << count | bits;
-    }
-
-    /// Returns the words in the order in which they are read. The first two are the state.
-    pub(in crate::packed) fn finish(mut self) -> Vec<u16> {
-        self.words.push((self.state & 0xffff) as u16);
-        self.words.push((self.state >> 16) as u16);
-        self.words.reverse();
-        self.words
-    }
-}
-
 /// Encodes a lane. Returns its words in the order in which they are read.
 fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
     let mut stack = Stack::new();
@@ -170,7 +120,7 @@ fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
         if entry & RAW == 0 {
             let context = (entry >> 8) as usize;
             let precision = Slot::stream_of(context).precision();
-            stack.symbol(tables.model(context, entry.to_le_bytes()[0]), precision);
+            stack.symbol(tables.interval(context, entry.to_le_bytes()[0]), precision);
         } else {
             stack.raw(entry >> 16 & 0xff, entry & 0xffff);
         }

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::packed::bitstream::broken::{BrokenHead, must};
 use crate::packed::bitstream::streams::{CONTEXTS, SLOTS, Slot};
 use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, BitModel, Bits};
-use crate::packed::entropy::log_probabilities::{LevelBitModels, LogProbabilities, MAX_SYMBOLS};
+use crate::packed::entropy::log_probabilities::{LogProbabilities, MAX_SYMBOLS, TableBitModels};
+use crate::packed::entropy::rans_state::Interval;
 
 /// Estimates of the bits of a table, and of each of its symbols, for the first pass that joins contexts.
 const TABLE_COST: f64 = 8.0;
@@ -59,20 +60,13 @@ impl Histogram {
     }
 }
 
-/// The range of a state's low bits that stands for a symbol.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(in crate::packed) struct Model {
-    pub(in crate::packed) start: u32,
-    pub(in crate::packed) share: u32,
-}
-
 /// One table of probabilities.
 #[derive(Debug, Clone)]
 struct Table {
     /// The table as it is written.
     levels: LogProbabilities,
-    /// The model of each symbol. A symbol that does not occur has a share of 0.
-    models: Vec<Model>,
+    /// The interval of each symbol. A symbol that does not occur has a share of 0.
+    intervals: Vec<Interval>,
 }
 
 impl Table {
@@ -80,13 +74,13 @@ impl Table {
     fn new(levels: LogProbabilities, precision: u32) -> Option<Self> {
         let shares = levels.shares(precision).filter(|shares| shares.len() <= MAX_SYMBOLS)?;
         let mut start = 0;
-        let models = shares.iter().map(|&share| {
-            let model = Model { start, share };
-            start += model.share;
-            model
+        let intervals = shares.iter().map(|&share| {
+            let interval = Interval { start, share };
+            start += share;
+            interval
         });
-        let models = models.collect();
-        Some(Self { levels, models })
+        let intervals = intervals.collect();
+        Some(Self { levels, intervals })
     }
 }
 
@@ -122,22 +116,23 @@ impl Tables {
         self.tables.get(context / CONTEXTS)?.get(usize::from(table))
     }
 
-    /// Returns the model of a symbol that was counted when the tables were made.
-    pub(in crate::packed) fn model(&self, context: usize, symbol: u8) -> Model {
-        self.share(context, symbol).unwrap_or(Model { start: 0, share: 1 })
+    /// Returns the interval of a symbol that was counted when the tables were made.
+    pub(in crate::packed) fn interval(&self, context: usize, symbol: u8) -> Interval {
+        self.share(context, symbol).unwrap_or(Interval { start: 0, share: 1 })
     }
 
-    /// Returns the model of a symbol. `None` if the symbol does not occur in the context.
-    pub(in crate::packed) fn share(&self, context: usize, symbol: u8) -> Option<Model> {
-        let model = self.table(context)?.models.get(usize::from(symbol))?;
-        (model.share > 0).then_some(*model)
+    /// Returns the interval of a symbol. `None` if the symbol does not occur in the context.
+    pub(in crate::packed) fn share(&self, context: usize, symbol: u8) -> Option<Interval> {
+        let interval = self.table(context)?.intervals.get(usize::from(symbol))?;
+        (interval.share > 0).then_some(*interval)
     }
 
     /// Returns the number of bits of all symbols that `histogram` counts in a context.
     pub(in crate::packed) fn bits(&self, context: usize, histogram: &Histogram) -> f64 {
         let used = (0_u8..=u8::MAX).zip(&histogram.counts).filter(|(_, count)| **count > 0);
         let precision = Slot::stream_of(context).precision();
-        let cost = |symbol| f64::from(precision) - libm::log2(f64::from(self.model(context, symbol).share));
+        let cost =
+            |symbol| f64::from(precision) - libm::log2(f64::from(self.interval(context, symbol).share));
         used.map(|(symbol, &count)| f64::from(count) * cost(symbol)).sum()
     }
 
@@ -212,7 +207,7 @@ impl Tables {
     }
 }
 
-/// The adaptive probabilities of the parts of [`Tables`].
+/// The adaptive probabilities of the bits of [`Tables`].
 #[derive(Debug, Default)]
 struct TablesOdds {
     /// Whether a set of contexts is used, by whether the set before is.
@@ -224,7 +219,7 @@ struct TablesOdds {
     changed: bool,
     /// Whether the other table is one that no earlier context of the set has.
     new: BitModel,
-    levels: LevelBitModels,
+    levels: TableBitModels,
 }
 
 /// A group of contexts that share a table.
@@ -338,8 +333,8 @@ impl Lookup {
             let mut starts = Vec::with_capacity(of_slot.len());
             for table in of_slot {
                 starts.push(entries.len() as u32);
-                for (symbol, model) in (0_u32..).zip(&table.models) {
-                    entries.extend((0..model.share).map(|over| entry(symbol, model.share, over)));
+                for (symbol, interval) in (0_u32..).zip(&table.intervals) {
+                    entries.extend((0..interval.share).map(|over| entry(symbol, interval.share, over)));
                 }
             }
             let mut set = [idle[slot.stream.precision() as usize]; PLACES];
@@ -430,9 +425,9 @@ mod tests {
             for (context, histogram) in counted.iter().enumerate() {
                 let whole = 1_u32 << Slot::stream_of(context).precision();
                 for (symbol, _) in (0..).zip(&histogram.counts).filter(|(_, count)| **count > 0) {
-                    let model = tables.model(context, symbol);
-                    assert!(model.share > 0 && model.start + model.share <= whole);
-                    assert_eq!(read.model(context, symbol), model, "{context} {symbol}");
+                    let interval = tables.interval(context, symbol);
+                    assert!(interval.share > 0 && interval.start + interval.share <= whole);
+                    assert_eq!(read.interval(context, symbol), interval, "{context} {symbol}");
                 }
                 let total: u32 = histogram.counts.iter().sum();
                 let ideal = |count: u32| f64::from(count) * libm::log2(f64::from(total) / f64::from(count));

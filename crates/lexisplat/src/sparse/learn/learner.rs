@@ -93,12 +93,12 @@ impl Learner<'_> {
         let most = STAGE_ROUNDS[0] + STAGE_ROUNDS[1] * (sizes.len() - 1) + settling;
         progress.begin(Stage::Learn, most as u64);
         for (stage, size) in sizes.into_iter().enumerate() {
-            let part = &self.sample.learn[..size * dim];
+            let rows = &self.sample.learn[..size * dim];
             // Each stage measures progress anew, because a stage with more vectors may begin at a worse score.
             let mut reference = f64::INFINITY;
             let mut patience = PATIENCE;
             for round in 1..=STAGE_ROUNDS[stage.min(1)] {
-                self.round(part, self.options.momentum)?;
+                self.round(rows, self.options.momentum)?;
                 progress.advance(1);
                 progress.check()?;
                 if round % EVALUATE_EVERY == 0 {
@@ -140,12 +140,12 @@ impl Learner<'_> {
         Coder::over(atoms, self.options.pursuit, self.options.stop.without_cap(), ValueType::F32)
     }
 
-    fn round(&mut self, part: &[f32], momentum: f32) -> Result<()> {
+    fn round(&mut self, rows: &[f32], momentum: f32) -> Result<()> {
         let dim = self.atoms.dim();
-        let mut training = Training::code(&self.coder(&self.atoms), part, self.beyond);
+        let mut training = Training::code(&self.coder(&self.atoms), rows, self.beyond);
         let mut atoms = update::refit(&self.atoms, &mut training);
         update::accelerate(&self.atoms, &mut atoms, &mut self.velocity, momentum);
-        atom_replacement::replace_useless(&mut atoms, &mut self.velocity, &training, part);
+        atom_replacement::replace_useless(&mut atoms, &mut self.velocity, &training, rows);
         self.atoms = Atoms::checked(dim, atoms)?;
         self.rounds += 1;
         Ok(())

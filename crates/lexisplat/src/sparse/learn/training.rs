@@ -39,31 +39,31 @@ impl Training {
     /// Codes all `vectors`. A vector that is stored exactly has no entries, and its residual is 0.
     pub(super) fn code(coder: &Coder, vectors: &[f32], beyond: Beyond) -> Self {
         let dim = coder.dim();
-        let parts = map_chunks(vectors.len() / dim, ROWS_PER_TASK, |range| {
-            let mut part = Self { dim, ..Self::default() };
+        let tasks = map_chunks(vectors.len() / dim, ROWS_PER_TASK, |range| {
+            let mut task = Self { dim, ..Self::default() };
             coder.encode(&vectors[range.start * dim..range.end * dim], |visit| {
                 let (code, _) = visit.nearest();
                 if visit.outcome == Encoded::Escape && beyond == Beyond::Exact {
-                    part.residuals.resize(part.residuals.len() + dim, 0.0);
+                    task.residuals.resize(task.residuals.len() + dim, 0.0);
                 } else if code.is_empty() {
-                    part.residuals.extend_from_slice(visit.signal);
+                    task.residuals.extend_from_slice(visit.signal);
                 } else {
-                    part.atoms.extend(code.iter().map(|&(atom, _)| atom));
-                    part.values.extend(code.iter().map(|&(_, value)| value));
-                    part.residuals
+                    task.atoms.extend(code.iter().map(|&(atom, _)| atom));
+                    task.values.extend(code.iter().map(|&(_, value)| value));
+                    task.residuals
                         .extend(visit.signal.iter().zip(visit.reconstruction()).map(|(x, y)| x - y));
                 }
-                part.starts.push(part.atoms.len());
+                task.starts.push(task.atoms.len());
             });
-            part
+            task
         });
         let mut all = Self { dim, starts: vec![0], ..Self::default() };
-        for part in parts {
+        for task in tasks {
             let offset = all.atoms.len();
-            all.starts.extend(part.starts.iter().map(|end| offset + end));
-            all.atoms.extend(part.atoms);
-            all.values.extend(part.values);
-            all.residuals.extend(part.residuals);
+            all.starts.extend(task.starts.iter().map(|end| offset + end));
+            all.atoms.extend(task.atoms);
+            all.values.extend(task.values);
+            all.residuals.extend(task.residuals);
         }
         all
     }
@@ -106,7 +106,7 @@ pub(super) struct Cost {
 pub(super) fn cost(coder: &Coder, vectors: &[f32], beyond: Beyond) -> Cost {
     let dim = coder.dim();
     let count = vectors.len() / dim;
-    let parts = map_chunks(count, GAUSSIANS_PER_TASK, |range| {
+    let tasks = map_chunks(count, GAUSSIANS_PER_TASK, |range| {
         let (mut nonzeros, mut squared_error, mut left) = (0_usize, 0.0, 0.0);
         coder.encode(&vectors[range.start * dim..range.end * dim], |visit| match visit.outcome {
             Encoded::Code { error } => {
@@ -128,8 +128,8 @@ pub(super) fn cost(coder: &Coder, vectors: &[f32], beyond: Beyond) -> Cost {
     });
     let scale = 1.0 / count.max(1) as f64;
     Cost {
-        nonzeros: parts.iter().map(|p| p.0).sum::<usize>() as f64 * scale,
-        squared_error: parts.iter().map(|p| p.1).sum::<f64>() * scale,
-        beyond: parts.iter().map(|p| p.2).sum::<f64>() * scale,
+        nonzeros: tasks.iter().map(|p| p.0).sum::<usize>() as f64 * scale,
+        squared_error: tasks.iter().map(|p| p.1).sum::<f64>() * scale,
+        beyond: tasks.iter().map(|p| p.2).sum::<f64>() * scale,
     }
 }

@@ -11,7 +11,7 @@
 //!
 //! **Determinism.** All long loops run element by element over atoms in lanes of fixed width. Every multiplication and
 //! every addition is rounded by itself, and the only reduction is a maximum. The result is therefore the same bit for
-//! bit on every CPU, whatever vector width the compiler or the run-time dispatch picks.
+//! bit on every CPU, at any vector width of the compiler and of the run-time dispatch.
 
 mod careful;
 mod engine;

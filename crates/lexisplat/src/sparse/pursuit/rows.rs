@@ -80,14 +80,14 @@ impl<V: RowValue> RowCodes<V> {
         self.errors.push(coded.error);
     }
 
-    /// Appends the rows of `part`.
-    fn append(&mut self, part: Self) {
+    /// Appends the rows of `more`.
+    fn append(&mut self, more: Self) {
         let (rows, pairs) = (self.len(), self.atoms.len());
-        self.starts.extend(part.starts[1..].iter().map(|end| pairs + end));
-        self.escapes.extend(part.escapes.iter().map(|row| rows + row));
-        self.atoms.extend(part.atoms);
-        self.values.extend(part.values);
-        self.errors.extend(part.errors);
+        self.starts.extend(more.starts[1..].iter().map(|end| pairs + end));
+        self.escapes.extend(more.escapes.iter().map(|row| rows + row));
+        self.atoms.extend(more.atoms);
+        self.values.extend(more.values);
+        self.errors.extend(more.errors);
     }
 }
 
@@ -166,10 +166,10 @@ pub fn encode_rows<V: RowValue>(coder: &Coder, rows: &[V], progress: &dyn Progre
     progress.begin(Stage::Code, count as u64);
     for start in (0..count).step_by(AT_ONCE) {
         let len = AT_ONCE.min(count - start);
-        for part in map_chunks(len, ROWS_PER_TASK, |piece| {
+        for codes in map_chunks(len, ROWS_PER_TASK, |piece| {
             encode_piece(&row_coder, rows, start + piece.start..start + piece.end, progress)
         }) {
-            all.append(part?);
+            all.append(codes?);
         }
     }
     progress.end();
@@ -187,8 +187,8 @@ fn encode_piece<V: RowValue>(
     let dim = coder.coder.dim();
     let rows = &rows[range.start * dim..range.end * dim];
     check_finite(dim, rows, range.start)?;
-    let mut part = RowCodes::default();
-    coder.each(rows, |coded| part.push(coded));
+    let mut codes = RowCodes::default();
+    coder.each(rows, |coded| codes.push(coded));
     progress.advance(range.len() as u64);
-    Ok(part)
+    Ok(codes)
 }

@@ -17,7 +17,7 @@ fn options() -> PackOptions {
 }
 
 /// An observer that draws nothing. Its methods return the results of the given functions.
-struct Told<J, R = fn(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>>> {
+struct Told<J, R = fn(&Splats, &Model, &[AppearanceSensitivity]) -> Result<Option<Vec<Appearance>>>> {
     judge: J,
     refit: Option<R>,
 }
@@ -31,7 +31,7 @@ impl<J: FnMut(&Splats) -> Result<Sensitivity>> Told<J> {
 impl<J, R> Observer for Told<J, R>
 where
     J: FnMut(&Splats) -> Result<Sensitivity>,
-    R: FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>>,
+    R: FnMut(&Splats, &Model, &[AppearanceSensitivity]) -> Result<Option<Vec<Appearance>>>,
 {
     fn observe(&mut self, part: &Splats) -> Result<Observed> {
         let memo = u64::try_from(part.len()).unwrap().to_le_bytes().to_vec();
@@ -42,7 +42,7 @@ where
         &mut self,
         part: &Splats,
         model: &Model,
-        weights: &[[f32; 2]],
+        weights: &[AppearanceSensitivity],
         memo: &[u8],
     ) -> Result<Option<Vec<Appearance>>> {
         assert_eq!(memo, u64::try_from(part.len()).unwrap().to_le_bytes());
@@ -96,7 +96,7 @@ fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
         let mut expected = Vec::new();
         LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
         assert!(found == expected, "{count}");
-        assert_eq!(done.tensor_bytes, LexiWriter::packed(&packed).attribute_bytes());
+        assert_eq!(done.tensor_bytes, LexiWriter::packed(&packed).tensor_bytes());
         let bits = packed.stream_bits().unwrap();
         for (a, b) in done.report.stream_bits.iter().zip(&bits) {
             assert!((a.bits - b.bits).abs() <= 1e-9 * b.bits, "{a:?} {b:?}");
@@ -157,7 +157,7 @@ fn appearances_are_fitted_part_by_part() {
         (0..model.len()).map(moved).collect()
     };
     let fitted = |options: &PackOptions, bucket: usize| {
-        let refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
+        let refit = |part: &Splats, model: &Model, weights: &[AppearanceSensitivity]| {
             // The part also has the Gaussians that the file leaves out, and the others are in order.
             assert!(part.len() > model.len() || options.keep_order);
             assert_eq!(model.len(), weights.len());

@@ -1,20 +1,20 @@
-//! Where a file is written, and what to do about one that exists.
+//! The path of an output, and the treatment of a file that exists there.
 
 use std::path::Path;
 
 use super::group::OutputGroup;
 
-/// What to do about a file that already exists.
+/// The treatment of a file that already exists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Existing {
-    /// The new file replaces it in one step.
+    /// The new file replaces the old one in one step.
     #[default]
     Replace,
     /// The write fails with [`io::ErrorKind::AlreadyExists`](std::io::ErrorKind::AlreadyExists), also if the file was made during the write.
     Refuse,
 }
 
-/// Where to write a file. A path converts into an output that replaces an existing file.
+/// The path of a file to write. A path converts into an output that replaces an existing file.
 #[derive(Debug, Clone, Copy)]
 pub struct Output<'a> {
     pub(super) path: &'a Path,
@@ -30,7 +30,7 @@ impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Output<'a> {
 }
 
 impl<'a> Output<'a> {
-    /// The file `path`. If `path` is a link, the file that it points to is written, and the link stays.
+    /// Creates an output to `path`. If `path` is a link, the file that it points to is written, and the link stays.
     pub fn new(path: &'a (impl AsRef<Path> + ?Sized), existing: Existing) -> Self {
         Self { path: path.as_ref(), existing, bytes: None, group: None }
     }
@@ -41,19 +41,19 @@ impl<'a> Output<'a> {
         Self { group: Some(group), ..self }
     }
 
-    /// The path as the caller named it.
+    /// Returns the path as the caller named it.
     #[must_use]
     pub fn path(&self) -> &'a Path {
         self.path
     }
 
-    /// Sets the size in bytes, which an error about a full disk then states.
+    /// Sets the size in bytes. The error of a full disk states it.
     pub(crate) fn of_bytes(self, bytes: u64) -> Self {
         Self { bytes: Some(bytes), ..self }
     }
 }
 
-/// The folder `path` is in.
+/// Returns the folder that `path` is in.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

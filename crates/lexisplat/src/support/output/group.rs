@@ -1,4 +1,4 @@
-//! Several outputs that a program can end at once, and what is still unfinished of them.
+//! Several outputs that a program can end at once, and the list of their unfinished files.
 
 use std::io;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempPath;
 
-/// Outputs that can be ended together, so that a program which a signal ends leaves no half-written file.
+/// Outputs that can be ended together. A program that is ended by a signal then leaves no half-written file.
 ///
 /// [`Output::within`](super::Output::within) puts an output into a group. Clones are the same group.
 ///
@@ -15,7 +15,7 @@ use tempfile::TempPath;
 #[derive(Debug, Clone, Default)]
 pub struct OutputGroup(Arc<Mutex<State>>);
 
-/// What a group knows of its outputs.
+/// The state of the outputs of a group.
 #[derive(Debug, Default)]
 pub(super) struct State {
     stopped: bool,
@@ -33,8 +33,8 @@ impl OutputGroup {
 
     /// Removes all unfinished files of the group. No output of the group can be finished afterwards.
     ///
-    /// Returns the number of outputs that were finished before; they stay. If that is at least `expected`,
-    /// there is nothing left to stop: the function does nothing and returns `None`.
+    /// Returns the number of outputs that were finished before. They stay. If the number is at least `expected`, nothing is
+    /// left to stop, and the function does nothing and returns `None`.
     #[must_use]
     pub fn stop(&self, expected: usize) -> Option<usize> {
         let mut state = self.state();
@@ -49,13 +49,13 @@ impl OutputGroup {
         Some(state.finished)
     }
 
-    /// Whether [`stop`](Self::stop) has stopped the group.
+    /// Returns whether [`stop`](Self::stop) has stopped the group.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.state().stopped
     }
 
-    /// Does `work` unless the group was stopped. [`stop`](Self::stop) waits for it, so it should be short.
+    /// Does `work` unless the group was stopped. [`stop`](Self::stop) waits for `work`, which should be short.
     pub(super) fn unless_stopped<T>(&self, work: impl FnOnce(&mut State) -> io::Result<T>) -> io::Result<T> {
         let mut state = self.state();
         if state.stopped {

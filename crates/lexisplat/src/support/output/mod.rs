@@ -1,7 +1,7 @@
 //! Files that appear whole or not at all.
 //!
-//! On Linux a file has no name until it is whole, if the file system supports that. Nothing is then left of it
-//! however the process ends. Elsewhere an unfinished file is named `.lexisplat-*.part` and lies in the folder of
+//! On Linux a file has no name until it is whole, if the file system supports that. An unfinished file then disappears
+//! however the process ends. On other systems an unfinished file is named `.lexisplat-*.part` and lies in the folder of
 //! the output. An error removes it, and so does [`OutputGroup::stop`].
 
 mod destination;
@@ -23,14 +23,14 @@ use crate::support::error::{Error, Result};
 pub use self::destination::{Existing, Output};
 pub use self::group::OutputGroup;
 
-/// The part of a file's mode that says who may read, write and run it; not whose rights it runs with.
+/// The bits of a file's mode for reading, writing and running, without those that change the user.
 #[cfg(unix)]
 const PERMISSIONS: u32 = 0o777;
-/// Bytes of the write buffer.
+/// Number of bytes of the write buffer.
 const BUFFER: usize = 1 << 20;
 
 impl Output<'_> {
-    /// Finds out, before any work is done, whether a file could be written here. Leaves no file behind.
+    /// Checks before any work that a file can be written here. Leaves no file behind.
     ///
     /// # Errors
     /// [`Error::Io`] if the path is a folder, if a file exists that must not be replaced, or if the folder around
@@ -43,7 +43,7 @@ impl Output<'_> {
         Ok(())
     }
 
-    /// The folder for temporary files as large as this output: the output's own folder, or the system's
+    /// Returns the folder for temporary files as large as this output: the output's own folder, or the system's
     /// temporary folder if the output is no regular file.
     ///
     /// # Errors
@@ -69,9 +69,10 @@ impl Output<'_> {
     }
 }
 
-/// Writes a file with `write` and returns what it returns. The file appears under its name only when it is whole and on the disk.
+/// Writes a file with `write` and returns the result of `write`. The file appears under its name only when it is whole
+/// and on the disk.
 ///
-/// An existing file is replaced in one step, or refused: see [`Existing`]. An error leaves nothing behind. A pipe
+/// An existing file is replaced in one step, or is an error; see [`Existing`]. An error leaves nothing behind. A pipe
 /// or a device such as `/dev/null` is written to directly.
 ///
 /// # Errors
@@ -110,7 +111,7 @@ pub fn write_whole<'a, T>(
     whole().map_err(|e| output.explained(e))
 }
 
-/// Gives `file`, which is to replace `target`, the permissions of that, if it is there.
+/// Gives `file` the permissions of `target`, which it replaces, if `target` exists.
 fn keep_mode(file: &File, target: &Path) -> io::Result<()> {
     #[cfg(unix)]
     let kept = match std::fs::metadata(target) {
@@ -129,8 +130,8 @@ fn keep_mode(file: &File, target: &Path) -> io::Result<()> {
     kept
 }
 
-/// Asks the system to store the new name on the disk too. Not every file system can, so errors are ignored: the
-/// file is whole either way.
+/// Asks the system to store the new name on the disk too. Some file systems cannot. Errors are ignored, because the file
+/// is whole in any case.
 fn sync_folder(folder: &Path) {
     if cfg!(unix)
         && let Ok(folder) = File::open(folder)

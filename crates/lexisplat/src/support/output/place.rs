@@ -1,4 +1,4 @@
-//! What an output's path leads to: nothing, a file, a link, a folder or a device.
+//! The target of an output's path: nothing, a file, a link, a folder or a device.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use super::destination::{Existing, Output, folder_of};
 use crate::support::error::{Error, Result};
 
-/// Most links followed in a row. Linux follows as many.
+/// Largest number of links that are followed one after the other, as in Linux.
 const MAX_LINKS: usize = 40;
 
-/// Where a file goes.
+/// The target of an output.
 #[derive(Debug)]
 pub(super) enum Place {
     /// A regular file of this name, which is no link.
@@ -19,7 +19,7 @@ pub(super) enum Place {
     Special,
 }
 
-/// Finds out where `output` goes.
+/// Returns the target of `output`.
 pub(super) fn place(output: &Output<'_>) -> Result<Place> {
     let path = output.path;
     let refuse = |kind: io::ErrorKind| Err(Error::io(path, kind.into()));
@@ -47,7 +47,7 @@ fn is_disk(found: &std::fs::Metadata) -> bool {
     }
 }
 
-/// The target of `path` if it is a link, whether the target exists or not; else `path` itself.
+/// Returns the target of `path` if it is a link, also if the target does not exist; otherwise `path` itself.
 fn followed(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
@@ -59,7 +59,7 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("too many links in a row"))
 }
 
-/// Adds to `error`, which came up when a file was made in `folder`, the folder and what to do.
+/// Adds the folder and advice to `error`, which occurred when a file was made in `folder`.
 pub(super) fn in_folder(folder: &Path, error: io::Error) -> io::Error {
     let advice = match error.kind() {
         io::ErrorKind::NotFound => "make it, or name another folder",

@@ -1,5 +1,5 @@
-//! A file that is being written. It has no name if the system allows that, else a temporary one that its group
-//! remembers.
+//! A file that is being written. It has no name if the system allows that, and otherwise a temporary name that its group
+//! keeps.
 
 use std::fs::File;
 use std::io;
@@ -18,11 +18,11 @@ pub(super) struct Temporary {
     group: OutputGroup,
 }
 
-/// Chooses names and permissions of unfinished files.
+/// Returns a builder with the names and the permissions of unfinished files.
 fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".lexisplat-").suffix(".part");
-    // A temporary file is private by default. The finished one should have the permissions of any new file.
+    // A temporary file is private by default. The finished file gets the permissions of any new file.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -100,7 +100,7 @@ impl Temporary {
     }
 }
 
-/// Copies `file` to `target` by way of a temporary file with a name. Some file systems make files without a name
+/// Copies `file` to `target` through a temporary file with a name. Some file systems make files without a name
 /// but cannot name them afterwards.
 #[cfg(target_os = "linux")]
 fn copy(file: &mut File, target: &Path, existing: Existing, group: &OutputGroup) -> io::Result<()> {

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, openat};
 
-/// Permissions before the umask: those of any new file.
+/// Permissions before the umask, as of any new file.
 const MODE: Mode = Mode::from_raw_mode(0o666);
 
-/// The path of an open file in `/proc`, from which a link can be made.
+/// Returns the path of an open file in `/proc`, from which a link can be made.
 fn of_process(file: &File) -> PathBuf {
     PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
 }

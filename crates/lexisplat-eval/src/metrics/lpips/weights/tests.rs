@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use safetensors::tensor::TensorView;
 
 use super::*;
-use crate::metrics::lpips::Range;
+use crate::metrics::lpips::PixelRange;
 use crate::metrics::lpips::testing::{random, tensors};
 use crate::metrics::testing::picture;
 
@@ -43,11 +43,11 @@ fn a_file_gives_the_network_it_holds() {
     let mut tensors = tensors(Network::Alex, 7);
     // Layers for classification may be there.
     tensors.push(("classifier.1.weight".to_owned(), vec![2], vec![f32::NAN; 2]));
-    let expected = random(Network::Alex, 7).distance(&a, &b, Range::Standard).unwrap();
+    let expected = random(Network::Alex, 7).distance(&a, &b, PixelRange::Standard).unwrap();
     for named in [Some("alex"), None] {
         let lpips = Lpips::from_bytes("weights", &file(&tensors, named)).unwrap();
         assert_eq!(lpips.network(), Network::Alex);
-        assert_eq!(lpips.distance(&a, &b, Range::Standard).unwrap().to_bits(), expected.to_bits());
+        assert_eq!(lpips.distance(&a, &b, PixelRange::Standard).unwrap().to_bits(), expected.to_bits());
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("weights.safetensors");

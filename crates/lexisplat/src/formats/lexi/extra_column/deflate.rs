@@ -40,20 +40,20 @@ pub(super) fn length_bytes(bytes: usize) -> [u8; LENGTH_BYTES] {
     u32::try_from(bytes).unwrap_or(u32::MAX).to_le_bytes()
 }
 
-/// Takes a length, and a part of that length, from the front of `from`.
+/// Takes a length, and as many bytes, from the front of `from`.
 pub(super) fn take_part<'a>(from: &mut &'a [u8]) -> Option<&'a [u8]> {
     let (length, rest) = from.split_first_chunk::<LENGTH_BYTES>()?;
-    let (part, rest) = rest.split_at_checked(usize::try_from(u32::from_le_bytes(*length)).ok()?)?;
+    let (bytes, rest) = rest.split_at_checked(usize::try_from(u32::from_le_bytes(*length)).ok()?)?;
     *from = rest;
-    Some(part)
+    Some(bytes)
 }
 
 fn deflate(bytes: &[u8], strategy: CompressionStrategy) -> Vec<u8> {
     let window = u8::try_from(MZ_DEFAULT_WINDOW_BITS).unwrap_or(u8::MAX);
     let mut state = CompressorOxide::with_params(DataFormat::Raw, LEVEL, strategy, window);
     let mut out = Vec::new();
-    let (status, _) = compress_to_output(&mut state, bytes, TDEFLFlush::Finish, |part| {
-        out.extend_from_slice(part);
+    let (status, _) = compress_to_output(&mut state, bytes, TDEFLFlush::Finish, |block| {
+        out.extend_from_slice(block);
         true
     });
     debug_assert_eq!(status, TDEFLStatus::Done, "a vector takes all bytes");

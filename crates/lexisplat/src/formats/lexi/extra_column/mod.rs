@@ -27,7 +27,7 @@ const TYPES: [ScalarType; 8] = [
     ScalarType::F64,
 ];
 
-/// An encoder of a column whose values come part after part. The bytes do not depend on how the values are cut into parts.
+/// An encoder of a column whose values are pushed in pieces. The bytes do not depend on the sizes of the pieces.
 #[derive(Debug)]
 pub(super) struct ColumnEncoder {
     ty: ScalarType,

@@ -75,16 +75,16 @@ proptest! {
             let column = Column::new(&bytes, words.len()).unwrap();
             prop_assert_eq!(column.scalar_type(), ty);
             prop_assert_eq!(all_bits(&column.values(0..words.len()).unwrap()), all_bits(&values));
-            let part = column.values(range.0..range.1).unwrap();
+            let piece = column.values(range.0..range.1).unwrap();
             let expected = all_bits(&values);
             let expected = expected.get(range.0..range.1.min(expected.len())).unwrap_or_default();
-            prop_assert_eq!(all_bits(&part), expected);
+            prop_assert_eq!(all_bits(&piece), expected);
             let cut = cut.min(words.len());
             let mut encoder = ColumnEncoder::new(ty);
-            let mut parts = encoder.push(&values_of(ty, &all_bits(&values)[..cut]));
-            parts.extend(encoder.push(&values_of(ty, &all_bits(&values)[cut..])));
-            parts.extend(encoder.finish());
-            prop_assert_eq!(parts, bytes);
+            let mut pieces = encoder.push(&values_of(ty, &all_bits(&values)[..cut]));
+            pieces.extend(encoder.push(&values_of(ty, &all_bits(&values)[cut..])));
+            pieces.extend(encoder.finish());
+            prop_assert_eq!(pieces, bytes);
         }
     }
 }
@@ -95,12 +95,12 @@ fn parts_do_not_change_the_bytes_and_ranges_are_slices() {
     for values in columns(rows) {
         let (ty, words) = (values.scalar_type(), all_bits(&values));
         let bytes = encode(&values);
-        for part in [BLOCK - 1, BLOCK, 2 * BLOCK + 5] {
+        for piece in [BLOCK - 1, BLOCK, 2 * BLOCK + 5] {
             let mut encoder = ColumnEncoder::new(ty);
-            let mut parts: Vec<u8> =
-                words.chunks(part).flat_map(|part| encoder.push(&values_of(ty, part))).collect();
-            parts.extend(encoder.finish());
-            assert!(parts == bytes, "{ty:?} in parts of {part}");
+            let mut pieces: Vec<u8> =
+                words.chunks(piece).flat_map(|piece| encoder.push(&values_of(ty, piece))).collect();
+            pieces.extend(encoder.finish());
+            assert!(pieces == bytes, "{ty:?} in pieces of {piece}");
         }
         let column = Column::new(&bytes, rows).unwrap();
         let ranges = [

@@ -122,7 +122,7 @@ proptest! {
 fn integers_are_nearest_to_parameters() {
     let mut p = Parameters {
         cell: 0.37,
-        base: [0.01, 0.002],
+        base: ColourAndShape { colour: 0.01, shape: 0.002 },
         factors: [1.5, 9.0, 0.5, 1.0, 2.0, 3.0],
         ..Default::default()
     };

@@ -3,13 +3,14 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::packed::bitstream::parameters::ColourAndShape;
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::rans_encoder::SymbolRecorder;
 use crate::packed::entropy::script::tables_of;
 use crate::packed::entropy::tables::{Lookup, Tables};
 
 /// The Gaussians of each lane. No lane has more than the first.
-type Scene = Lanes<Vec<CodedGaussian>>;
+type LaneLists = Lanes<Vec<CodedGaussian>>;
 
 fn forms() -> impl Strategy<Value = RestForm> {
     let least = prop_oneof![Just(vec![1]), Just(vec![6, 1]), Just(vec![12, 6, 1])];
@@ -31,87 +32,86 @@ fn target(form: &RestForm) -> impl Strategy<Value = CodedGaussian> + use<> {
     let pairs = prop::collection::vec((0..=last, value), dim);
     let finite = prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO;
     let exact = prop::option::weighted(0.1, prop::collection::vec(finite, dim));
-    let parts = (count, pairs, exact, prop::array::uniform2(0_u8..16));
-    parts.prop_map(|(count, mut code, exact, classes)| {
+    let fields = (count, pairs, exact, 0_u8..16);
+    fields.prop_map(|(count, mut code, exact, colour)| {
         code.truncate(if exact.is_some() { 0 } else { count });
-        let mut target = CodedGaussian::default();
-        (target.classes, target.code, target.exact) = (classes, code, exact.unwrap_or_default());
-        target
+        let classes = ColourAndShape { colour, shape: 0 };
+        CodedGaussian { classes, code, exact: exact.unwrap_or_default(), ..CodedGaussian::default() }
     })
 }
 
-fn scenes() -> impl Strategy<Value = (RestForm, Scene)> {
-    let scene = |form: RestForm| {
+fn lane_lists() -> impl Strategy<Value = (RestForm, LaneLists)> {
+    let lists = |form: RestForm| {
         let lane = prop::collection::vec(target(&form), 0..10);
         (Just(form), prop::collection::vec(lane, LANES))
     };
-    forms().prop_flat_map(scene).prop_map(|(form, mut lanes)| {
+    forms().prop_flat_map(lists).prop_map(|(form, mut lanes)| {
         lanes.sort_by_key(|lane| std::cmp::Reverse(lane.len()));
         (form, std::array::from_fn(|l| std::mem::take(&mut lanes[l])))
     })
 }
 
 /// Returns the set of lanes that have Gaussian `i`.
-fn set(scene: &Scene, i: usize) -> u32 {
-    scene.iter().enumerate().fold(0, |set, (l, lane)| set | u32::from(i < lane.len()) << l)
+fn set(lists: &LaneLists, i: usize) -> u32 {
+    lists.iter().enumerate().fold(0, |set, (l, lane)| set | u32::from(i < lane.len()) << l)
 }
 
 /// Number of Gaussians of a block in these tests, which is small so that several blocks are coded.
 const FEW: usize = 4;
 
-/// Codes the scene block by block, or decodes as many Gaussians and hands each of them to `see`.
+/// Codes the lists block by block, or decodes as many Gaussians and hands each of them to `see`.
 fn code<S: Symbols>(
-    parts: &mut [S],
+    coders: &mut [S],
     form: &RestForm,
-    scene: &Scene,
+    lists: &LaneLists,
     encoder: bool,
     mut see: impl FnMut(&Rest, usize),
 ) -> Option<()> {
     let mut rest = Rest::default();
-    let count = scene[0].len();
+    let count = lists[0].len();
     for first in (0..count).step_by(FEW) {
         rest.clear();
         let block = first..count.min(first + FEW);
         for i in block.clone() {
-            let colours = each(|l| scene[l].get(i).map_or(0, |target| target.classes[0].into()));
-            rest.push(set(scene, i), colours);
+            let colours = each(|l| lists[l].get(i).map_or(0, |target| target.classes.colour.into()));
+            rest.push(set(lists, i), colours);
         }
-        let of = |l: usize| scene[l].iter().skip(first).take(block.len()).collect();
+        let of = |l: usize| lists[l].iter().skip(first).take(block.len()).collect();
         let wanted: Lanes<Vec<&CodedGaussian>> = std::array::from_fn(of);
-        for (part, s) in parts.iter_mut().enumerate() {
-            rest.part(s, encoder.then_some(&wanted), form, part).ok()?;
+        for (part, s) in coders.iter_mut().enumerate() {
+            rest.sh_part(s, encoder.then_some(&wanted), form, part).ok()?;
         }
         see(&rest, first);
     }
     Some(())
 }
 
-/// Returns the ranges of all parts, and their tables.
-fn recorded(form: &RestForm, scene: &Scene) -> (Vec<Vec<u8>>, Tables) {
-    let mut parts = vec![SymbolRecorder::default(); form.least.len()];
-    code(&mut parts, form, scene, true, |_, _| ()).unwrap();
-    let all = parts.iter().fold(SymbolRecorder::default(), |all, part| {
+/// Returns the ranges of all coders, and their tables.
+fn recorded(form: &RestForm, lists: &LaneLists) -> (Vec<Vec<u8>>, Tables) {
+    let mut coders = vec![SymbolRecorder::default(); form.least.len()];
+    code(&mut coders, form, lists, true, |_, _| ()).unwrap();
+    let all = coders.iter().fold(SymbolRecorder::default(), |all, part| {
         let lanes = all.entries().iter().zip(part.entries());
         SymbolRecorder::restore(lanes.map(|(a, b)| [a.as_slice(), b].concat()).collect())
     });
     let (_, tables) = tables_of(&all).unwrap();
-    (parts.iter().map(|part| part.finish(&tables, LANES)).collect(), tables)
+    (coders.iter().map(|part| part.finish(&tables, LANES)).collect(), tables)
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
     #[test]
-    fn codes_and_rows_come_back((form, scene) in scenes()) {
-        let (ranges, tables) = recorded(&form, &scene);
+    fn codes_and_rows_come_back((form, lists) in lane_lists()) {
+        let (ranges, tables) = recorded(&form, &lists);
         let lookup = Lookup::new(&tables);
-        // A part that is missing has no nonzeros, and changes nothing in the parts before it.
+        // A part that is missing has no nonzeros, and changes nothing in the coders before it.
         for there in 1..=form.least.len() {
-            let player = |k: usize| SymbolDecoder::new(&lookup, &ranges[k], LANES, false).unwrap();
-            let mut players: Vec<SymbolDecoder<'_>> = (0..there).map(player).collect();
+            let decoder = |k: usize| SymbolDecoder::new(&lookup, &ranges[k], LANES, false).unwrap();
+            let mut decoders: Vec<SymbolDecoder<'_>> = (0..there).map(decoder).collect();
             let mut seen = 0;
-            code(&mut players, &form, &scene, false, |rest, first| {
-                for (l, lane) in scene.iter().enumerate() {
+            code(&mut decoders, &form, &lists, false, |rest, first| {
+                for (l, lane) in lists.iter().enumerate() {
                     let mut cursor = Cursor::default();
                     for (i, target) in lane.iter().skip(first).take(rest.len()).enumerate() {
                         seen += 1;
@@ -126,10 +126,10 @@ proptest! {
                                     let bits = |row: &[f32]| row.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
                                     assert_eq!(bits(row), bits(&target.exact));
                                 }
-                                Coded::Code(from, count) => {
+                                Coded::Code { first, count } => {
                                     assert!(part > 0 || target.exact.is_empty());
                                     let found: Vec<(u16, i32)> =
-                                        rest.nonzeros(part, from, count, l).collect();
+                                        rest.nonzeros(part, first, count, l).collect();
                                     assert_eq!(found, expected, "part {part} of {there}");
                                 }
                             }
@@ -138,22 +138,22 @@ proptest! {
                 }
             })
             .unwrap();
-            prop_assert_eq!(seen, scene.iter().map(Vec::len).sum::<usize>());
-            prop_assert!(players.iter().all(|player| player.check_end().is_ok()));
+            prop_assert_eq!(seen, lists.iter().map(Vec::len).sum::<usize>());
+            prop_assert!(decoders.iter().all(|decoder| decoder.check_end().is_ok()));
         }
     }
 
     /// A decoder with fewer atoms or shorter rows refuses codes that it cannot have.
     #[test]
-    fn what_cannot_be_is_refused((form, scene) in scenes()) {
-        let atoms = scene.iter().flatten().flat_map(|t| &t.code).map(|c| usize::from(c.0)).max();
-        let longest = scene.iter().flatten().map(|t| t.code.len()).max().unwrap_or(0);
-        let (ranges, tables) = recorded(&form, &scene);
+    fn what_cannot_be_is_refused((form, lists) in lane_lists()) {
+        let atoms = lists.iter().flatten().flat_map(|t| &t.code).map(|c| usize::from(c.0)).max();
+        let longest = lists.iter().flatten().map(|t| t.code.len()).max().unwrap_or(0);
+        let (ranges, tables) = recorded(&form, &lists);
         let lookup = Lookup::new(&tables);
         let play = |form: &RestForm| {
-            let mut players: Vec<SymbolDecoder<'_>> =
+            let mut decoders: Vec<SymbolDecoder<'_>> =
                 ranges.iter().map(|range| SymbolDecoder::new(&lookup, range, LANES, false).unwrap()).collect();
-            code(&mut players, form, &scene, false, |_, _| ())
+            code(&mut decoders, form, &lists, false, |_, _| ())
         };
         prop_assert!(play(&form).is_some());
         if let Some(largest) = atoms.filter(|&a| a > 0 && (form.atoms <= 256 || a > 256)) {
@@ -171,11 +171,11 @@ proptest! {
 fn rows_that_are_not_finite_are_refused() {
     let form = RestForm { dim: 9, atoms: 4, least: vec![6, 1] };
     for wild in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-        let mut scene = Scene::default();
+        let mut lists = LaneLists::default();
         let mut exact = vec![1.0; 9];
         exact[8] = wild;
-        scene[0].push(CodedGaussian { exact, ..CodedGaussian::default() });
-        let mut parts = vec![SymbolRecorder::default(); 2];
-        assert!(code(&mut parts, &form, &scene, true, |_, _| ()).is_none(), "{wild}");
+        lists[0].push(CodedGaussian { exact, ..CodedGaussian::default() });
+        let mut coders = vec![SymbolRecorder::default(); 2];
+        assert!(code(&mut coders, &form, &lists, true, |_, _| ()).is_none(), "{wild}");
     }
 }

@@ -5,7 +5,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::packed::bitstream::parameters::Parameters;
+use crate::packed::bitstream::parameters::{ColourAndShape, Parameters};
 use crate::packed::encode::canonical::Canonical;
 
 /// Rotates the vector `v` by the quaternion w, x, y, z.
@@ -119,7 +119,7 @@ proptest! {
         let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|v| turned(q, v));
         let parameters = Parameters { cell: 1.0, dc_axes: [[0.0; 3]; 3], ..Parameters::default() };
         let form = Canonical { axes: axes.map(|axis| axis.map(|v| v as f32)), ..Canonical::default() };
-        let target = form.coded(0, [0.0; 3], [0; 2], &parameters, 1.0);
+        let target = form.coded(0, [0.0; 3], ColourAndShape::default(), &parameters, 1.0);
         let codes = target.rotation_codes(bits, needle);
         prop_assert!(codes[0] >> bits[0] == 0 && codes[1] >> bits[0] == 0 && codes[2] >> bits[1] == 0);
         let out = rotations(&codes.map(|c| [c; LANES]), &bits.map(|b| [b; LANES]), &[needle; LANES]);

@@ -8,14 +8,14 @@ use crate::scene::splats::Geometry;
 use crate::{Sensitivity, Silent};
 
 /// Returns a packed scene of two layers. With `row`, every 100th SH-rest row has this value in all of its coefficients.
-fn packed(row: Option<f32>, viewpoints: Vec<[f32; 3]>) -> Packed {
+fn packed(row: Option<f32>, points_of_view: Vec<[f32; 3]>) -> Packed {
     let mut splats = crate::support::testing::scene(9000, 11);
     let dim = splats.degree.rest();
     if let Some(value) = row {
         splats.sh_rest.chunks_exact_mut(dim).step_by(100).for_each(|row| row.fill(value));
     }
     let mut options = PackOptions::default();
-    (options.atoms, options.viewpoints) = (Some(20), viewpoints);
+    (options.atoms, options.points_of_view) = (Some(20), points_of_view);
     let sensitivity = Sensitivity::guess(&splats.geometry);
     Packer::new(&splats, &sensitivity, &options).unwrap().pack(1e-5, &Silent).unwrap().0
 }
@@ -70,20 +70,20 @@ fn assert_finite(d: &Decoded) {
 fn chunks_are_decoded_from_the_ranges_that_are_there() {
     let packed = packed(Some(1e6), Vec::new());
     let of = decoder(&packed);
-    assert_eq!(of.head.index.layers.iter().map(|form| form.levels).collect::<Vec<_>>(), [2, 1]);
+    assert_eq!(of.head.index.layers.iter().map(|form| form.refinements).collect::<Vec<_>>(), [2, 1]);
     for (c, chunk) in of.head.index.chunks.iter().enumerate() {
-        let LayerForm { levels, parts, .. } = of.head.index.layer(chunk.layer);
+        let LayerForm { refinements, sh_parts, .. } = of.head.index.layer(chunk.layer);
         let with = |finer: usize, rest: usize| {
             let there = move |k: usize| {
-                k == 0 || (1..=finer).contains(&k) || (1 + levels..1 + levels + rest).contains(&k)
+                k == 0 || (1..=finer).contains(&k) || (1 + refinements..1 + refinements + rest).contains(&k)
             };
             decoded(&of, &packed, c, there).unwrap()
         };
-        let all = with(levels, parts);
+        let all = with(refinements, sh_parts);
         let (mut moved, mut coloured) = (f64::INFINITY, f64::INFINITY);
-        for finer in 0..=levels {
+        for finer in 0..=refinements {
             let (mut before, mut none) = (0, None);
-            for rest in 0..=parts {
+            for rest in 0..=sh_parts {
                 let found = with(finer, rest);
                 assert_finite(&found);
                 // Scales and opacities are in the base in full.
@@ -104,7 +104,7 @@ fn chunks_are_decoded_from_the_ranges_that_are_there() {
                 before = nonzeros;
                 // The integers of a range do not depend on later ranges.
                 for (k, range) in chunk.ranges.iter().enumerate() {
-                    if k <= finer || (1 + levels..1 + levels + rest).contains(&k) {
+                    if k <= finer || (1 + refinements..1 + refinements + rest).contains(&k) {
                         assert_eq!(found.sums[k], range.integers, "range {k} of chunk {c}");
                     }
                 }
@@ -143,8 +143,8 @@ fn base_colours_are_seen_on_average() {
     let (of, from) = (decoder(&plain), decoder(&seen));
     for c in 0..from.head.index.chunks.len() {
         let colours = |of: &BitstreamDecoder, packed: &Packed, codes: bool| {
-            let levels = of.head.index.layer(of.head.index.chunks[c].layer).levels;
-            decoded(of, packed, c, |k| codes || k <= levels).unwrap()
+            let refinements = of.head.index.layer(of.head.index.chunks[c].layer).refinements;
+            decoded(of, packed, c, |k| codes || k <= refinements).unwrap()
         };
         let (whole, bare) = (colours(&from, &seen, true), colours(&from, &seen, false));
         assert_finite(&whole);

@@ -1,7 +1,7 @@
 //! Choice of the number of atoms that a small scene learns, and of their precision.
 
 use super::costs::Costs;
-use super::{Codebook, PRICE, StopRule, first_atoms, learn};
+use super::{Codebook, PRICE, RateAndDistortion, StopRule, first_atoms, learn};
 use crate::packed::bitstream::{WholeAtoms, axes};
 use crate::scene::sh::ShDegree;
 use crate::sparse::learn::unit_axis;
@@ -9,7 +9,7 @@ use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 
 /// Divisors of the number of atoms that a scene justifies. Each quotient is tried as the number of learned atoms.
-const PARTS: [usize; 3] = [4, 2, 1];
+const DIVISORS: [usize; 3] = [4, 2, 1];
 /// Steps of values that are tried, as shares of the usual step. With few atoms, errors are larger at the same step.
 const STEPS: [f32; 5] = [1.0, 0.9, 0.8, 0.7, 0.6];
 /// Price of an error above that of the reference, as a multiple of the usual price of an error. The reference is the first
@@ -45,7 +45,7 @@ pub(in crate::packed) fn choose(
 ) -> Result<Choice> {
     let dim = degree.rest();
     let mut tried: Vec<(usize, bool, f32)> = vec![(pays.max(dim), false, 1.0)];
-    let mut counts: Vec<usize> = PARTS.iter().map(|part| pays / part).collect();
+    let mut counts: Vec<usize> = DIVISORS.iter().map(|divisor| pays / divisor).collect();
     counts.insert(0, 0);
     counts.dedup();
     tried.extend(STEPS.iter().flat_map(|&step| counts.iter().map(move |&count| (count, true, step))));
@@ -59,7 +59,11 @@ pub(in crate::packed) fn choose(
         let fixed = fixed.len() / dim;
         let (learned, costs) = learn(dim, &scaled, classes, first, fixed, StopRule::Balanced, progress)?;
         let usual = bits_of(&scaled, &learned, &costs);
-        if !with_axes && Codebook::new(dim, learned.clone(), costs.clone()).uses_nothing(&scaled, classes) {
+        let no_code_pays = || {
+            let book = Codebook::new(dim, learned.clone(), costs.clone());
+            book.encode(&scaled, classes, StopRule::Balanced).pairs.is_empty()
+        };
+        if !with_axes && no_code_pays() {
             // A dictionary has at least one atom.
             let atoms = WholeAtoms::new(degree, &unit_axis(dim, 0).collect::<Vec<f32>>(), LEAST_BITS, false);
             return Ok(Choice { atoms, costs: Costs::initial(1, dim), step });
@@ -72,7 +76,7 @@ pub(in crate::packed) fn choose(
         };
         for bits in (fewest..=usual).rev() {
             let atoms = WholeAtoms::new(degree, own, bits, with_axes);
-            let (error, bits) =
+            let RateAndDistortion { bits, error } =
                 Codebook::new(dim, atoms.rows(), costs.clone()).rate_and_distortion(&scaled, classes);
             let error = error * f64::from(step) * f64::from(step);
             if best.is_none() {

@@ -32,6 +32,7 @@ const MAX_VALUE: f32 = 1e6;
 const TAKES_PER_VALUE: usize = 8;
 /// Number of colour classes with costs of their own for the number of nonzeros. Higher classes share those of the last one.
 const COUNT_CLASSES: usize = 12;
+
 /// The codes of many rows, one after the other. A code is a list of pairs `(atom, value)`.
 #[derive(Debug, Default, Clone)]
 pub(in crate::packed) struct Codes {
@@ -56,6 +57,13 @@ impl Codes {
         self.pairs.extend_from_slice(&other.pairs);
         self.ends.extend(other.ends.iter().map(|end| end + offset));
     }
+}
+
+/// The rate and the distortion of codes.
+struct RateAndDistortion {
+    bits: f64,
+    /// Sum of squared errors, in squared steps.
+    error: f64,
 }
 
 /// A dictionary with its costs, prepared for coding.
@@ -106,7 +114,7 @@ impl Codebook {
 
     /// Returns the codes of all rows. `classes` has one colour class a row.
     pub(in crate::packed) fn encode(&self, rows: &[f32], classes: &[u8], stop: StopRule) -> Codes {
-        let parts = map_chunks(classes.len(), GAUSSIANS_PER_TASK, |range| {
+        let tasks = map_chunks(classes.len(), GAUSSIANS_PER_TASK, |range| {
             let mut codes = Codes::default();
             Simd::current().run(Job {
                 book: self,
@@ -118,19 +126,14 @@ impl Codebook {
             codes
         });
         let mut all = Codes::default();
-        for part in &parts {
-            all.append(part);
+        for codes in &tasks {
+            all.append(codes);
         }
         all
     }
 
-    /// Returns whether the codes of all rows are empty.
-    fn uses_nothing(&self, rows: &[f32], classes: &[u8]) -> bool {
-        self.encode(rows, classes, StopRule::Balanced).pairs.is_empty()
-    }
-
-    /// Returns the sum of the squared errors of the codes of all rows, and the sum of their bits.
-    fn rate_and_distortion(&self, rows: &[f32], classes: &[u8]) -> (f64, f64) {
+    /// Returns the sums over the codes of all rows.
+    fn rate_and_distortion(&self, rows: &[f32], classes: &[u8]) -> RateAndDistortion {
         let codes = self.encode(rows, classes, StopRule::Balanced);
         let (mut error, mut bits) = (0.0, 0.0);
         for (i, (row, &class)) in rows.chunks_exact(self.dim).zip(classes).enumerate() {
@@ -146,7 +149,7 @@ impl Codebook {
             }
             error += f64::from(left.iter().map(|x| x * x).sum::<f32>());
         }
-        (error, bits)
+        RateAndDistortion { bits, error }
     }
 
     fn scratch(&self) -> Scratch {
@@ -195,7 +198,7 @@ impl Codebook {
                 Some(pair) => pair.1 += value,
                 None => s.code.push((best as u16, value)),
             }
-            energy -= self.refine(s);
+            energy -= self.round_again(s);
         }
         if stop == StopRule::Balanced {
             self.drop_costly(s, counts);
@@ -216,7 +219,7 @@ impl Codebook {
 
     /// Rounds every value again, since later atoms changed the residual. Returns the decrease of the squared error.
     #[inline(always)]
-    fn refine(&self, s: &mut Scratch) -> f32 {
+    fn round_again(&self, s: &mut Scratch) -> f32 {
         let mut gained = 0.0;
         for k in 0..s.code.len() {
             let atom = usize::from(s.code[k].0);

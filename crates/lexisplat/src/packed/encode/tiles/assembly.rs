@@ -6,14 +6,34 @@ use super::coding::{Coded, Coding, Counts, Tables};
 use super::plan::Plan;
 use crate::formats::lexi::LexiWriter;
 use crate::packed::encode::encoding::{Finished, Ranges};
-use crate::packed::scene::SpilledPacked;
+use crate::packed::scene::{PackedHead, SpilledPacked};
 use crate::scene::extra::Extra;
 use crate::scene::spilled::SpilledExtras;
-use crate::stream::PackedFile;
+use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 use crate::support::sink::Sink;
 use crate::support::spill::{Spill, SpillTo, Spilled};
+
+/// A packed file that was written.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct PackedFile {
+    /// The head of the file.
+    pub head: PackedHead,
+    /// A report of the packing.
+    pub report: CompressReport,
+    /// Number of bytes of each tensor and of the header; see [`LexiWriter::tensor_bytes`].
+    pub tensor_bytes: Vec<(String, u64)>,
+}
+
+impl PackedFile {
+    /// Returns the number of bytes of the file.
+    #[must_use]
+    pub fn file_bytes(&self) -> u64 {
+        self.tensor_bytes.iter().map(|t| t.1).sum()
+    }
+}
 
 /// A file under construction, to which coded buckets are added in order.
 #[derive(Debug)]
@@ -119,7 +139,7 @@ impl<'a> Assembly<'a> {
         let order = (!orders.is_empty()).then_some(orders);
         let spilled = SpilledPacked { data, order, extras: by_column(extras) };
         let writer = LexiWriter::spilled_packed(&head, spilled)?;
-        let tensor_bytes = writer.attribute_bytes().to_vec();
+        let tensor_bytes = writer.tensor_bytes().to_vec();
         writer.write(sink, progress)?;
         Ok(PackedFile { head, report, tensor_bytes })
     }

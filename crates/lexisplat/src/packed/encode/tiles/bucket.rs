@@ -64,8 +64,8 @@ impl<'p> BucketReader<'p> {
     /// # Errors
     /// [`Error::Parameter`] if `bytes` are not a piece of this bucket and this scene.
     pub fn add_piece(&mut self, bytes: &[u8]) -> Result<()> {
-        let Piece { scene, bucket, places, rows } = Piece::from_bytes(bytes)?;
-        self.plan.check("piece", [scene], None)?;
+        let Piece { plan_id, bucket, places, rows } = Piece::from_bytes(bytes)?;
+        self.plan.check("piece", [plan_id], None)?;
         if bucket != self.bucket.number {
             return Err(Error::parameter(
                 "piece",
@@ -106,7 +106,7 @@ impl<'p> BucketReader<'p> {
 
 impl Bucket {
     /// Returns the cell of each Gaussian, and its number in the bucket.
-    pub(super) fn scene(&self) -> Vec<MortonKey> {
+    pub(super) fn keys(&self) -> Vec<MortonKey> {
         (0..).zip(&self.places).map(|(source, place)| MortonKey { source, ..*place }).collect()
     }
 

@@ -8,7 +8,7 @@ use super::message::messages;
 use super::plan::Plan;
 use super::sample::SampleStatistics;
 use super::steps::Steps;
-use crate::packed::bitstream::{MeanView, WholeAtoms};
+use crate::packed::bitstream::{PointsOfView, WholeAtoms};
 use crate::packed::curve::MortonKey;
 use crate::packed::encode::codebook::{Choice, Costs};
 use crate::packed::encode::coder::{ChunkCoder, Learning, VALUES, too_large};
@@ -19,8 +19,8 @@ use crate::packed::encode::quantised::{Gaussians, Quantised, Refit};
 use crate::packed::entropy::tables;
 use crate::packed::entropy::tables::Lookup;
 use crate::scene::extra::Extra;
-use crate::scene::splats::Splats;
-use crate::scene::splats::filter;
+use crate::scene::sensitivity::AppearanceSensitivity;
+use crate::scene::splats::{Splats, filter};
 use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
@@ -30,7 +30,7 @@ use crate::support::stopwatch::Stopwatch;
 /// The parameters, the dictionary and the costs with which all buckets are coded.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Coding {
-    scene: u32,
+    plan_id: u32,
     pub(super) steps: Steps,
     floor: Floor,
     most_dc: f64,
@@ -44,7 +44,7 @@ pub struct Coding {
 /// The coded Gaussians of a bucket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Coded {
-    scene: u32,
+    plan_id: u32,
     pub(super) bucket: usize,
     /// The bytes of the tables with which the chunks are coded: the bucket's own, or those of all buckets.
     tables: Vec<u8>,
@@ -64,14 +64,14 @@ pub(super) struct CodedLayer {
 /// Counts of how often each symbol occurs in a bucket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Counts {
-    scene: u32,
+    plan_id: u32,
     pub(super) counts: encoding::Counts,
 }
 
 /// The tables with which all buckets are coded.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Tables {
-    scene: u32,
+    plan_id: u32,
     pub(super) bytes: Vec<u8>,
 }
 
@@ -90,7 +90,7 @@ impl Coding {
         groups: &[SampleStatistics],
         progress: &dyn Progress,
     ) -> Result<Self> {
-        plan.check("steps", [steps.scene], None)?;
+        plan.check("steps", [steps.plan_id], None)?;
         let all = SampleStatistics::sum(plan, groups)?;
         let mut floor = steps.floor.clone().within(all.over);
         all.predictors.solve(&mut floor.parameters);
@@ -102,7 +102,7 @@ impl Coding {
         let learning = Learning { degree, total: steps.kept(), stop, options: &plan.options };
         let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
         let most_dc = f64::from(all.dc.quantile(USUAL_DC));
-        Ok(Self { scene: plan.scene(), steps: steps.clone(), floor, most_dc, atoms, costs, value_step: step })
+        Ok(Self { plan_id: plan.id(), steps: steps.clone(), floor, most_dc, atoms, costs, value_step: step })
     }
 
     /// Returns the number of Gaussians that are coded.
@@ -113,15 +113,15 @@ impl Coding {
 
     /// Returns an encoder that has coded nothing.
     pub(super) fn encoding(&self, plan: &Plan) -> Result<Encoding> {
-        plan.check("coding", [self.scene], None)?;
+        plan.check("coding", [self.plan_id], None)?;
         let clock = Stopwatch::start();
-        let mean_view = MeanView::new(&plan.options.viewpoints);
+        let points_of_view = PointsOfView::new(&plan.options.points_of_view);
         let (floor, stop) = (&self.floor, self.steps.stop);
         let mut parameters = floor.parameters.clone();
         parameters.factors[VALUES] *= self.value_step;
         let coder = ChunkCoder::learned(
             parameters,
-            mean_view,
+            points_of_view,
             &self.atoms,
             self.costs.clone(),
             stop,
@@ -146,17 +146,20 @@ impl Coding {
         progress: &dyn Progress,
     ) -> Result<(Counts, Coded), E> {
         let splats = &bucket.splats;
-        let (mut weights, stays) = looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
-        let mut scene = bucket.scene();
-        filter(&mut scene, &stays);
-        filter(&mut weights, &stays);
-        let free = self.steps.steps.classes_of(&weights);
-        let classes = self.floor.classes(&free, &splats.geometry, &scene);
-        let gaussians = Gaussians { scene, classes, weights };
+        let (mut sensitivities, stays) =
+            looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
+        let mut keys = bucket.keys();
+        filter(&mut keys, &stays);
+        filter(&mut sensitivities, &stays);
+        let free = self.steps.steps.classes_of(&sensitivities);
+        let classes = self.floor.classes(&free, &splats.geometry, &keys);
+        let gaussians = Gaussians { keys, classes, sensitivities };
         let options = &plan.options;
         let quantised = Quantised::of_part(splats, options, gaussians, self.encoding(plan)?, progress)?;
         let mut refit = refit.map(|refit| {
-            |part: &Splats, model: &Model, weights: &[[f32; 2]]| refit(part, model, &looked.observed(weights))
+            |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| {
+                refit(part, model, &looked.observed(own))
+            }
         });
         let appearances =
             quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
@@ -177,9 +180,9 @@ impl Coding {
                 options.keep_order.then(|| quantised.sources()[own.clone()].iter().map(place).collect());
             layers.push(CodedLayer { gaussians, order, extras: quantised.extras(own) });
         }
-        let scene = self.scene;
-        let coded = Coded { scene, bucket: bucket.number, tables: tables.write(), chunks, layers };
-        Ok((Counts { scene, counts }, coded))
+        let coded =
+            Coded { plan_id: self.plan_id, bucket: bucket.number, tables: tables.write(), chunks, layers };
+        Ok((Counts { plan_id: self.plan_id, counts }, coded))
     }
 }
 
@@ -192,11 +195,11 @@ impl Tables {
     pub fn new(counts: &[Counts]) -> Result<Self> {
         let wrong = || Error::parameter("counts", counts.len(), "those of all buckets of a scene");
         let all = Counts::sum(counts).ok_or_else(wrong)?;
-        Ok(Self { scene: all.scene, bytes: tables::Tables::of(&all.counts)?.write() })
+        Ok(Self { plan_id: all.plan_id, bytes: tables::Tables::of(&all.counts)?.write() })
     }
 
     pub(super) fn read(&self, plan: &Plan) -> Result<tables::Tables> {
-        plan.check("tables", [self.scene], None)?;
+        plan.check("tables", [self.plan_id], None)?;
         tables::Tables::read(&self.bytes).map_err(|rule| Error::parameter("tables", rule, "tables"))
     }
 }
@@ -207,7 +210,7 @@ impl Counts {
         let (first, rest) = all.split_first()?;
         let mut sum = first.clone();
         rest.iter().for_each(|more| sum.counts.add(&more.counts));
-        rest.iter().all(|more| more.scene == sum.scene).then_some(sum)
+        rest.iter().all(|more| more.plan_id == sum.plan_id).then_some(sum)
     }
 }
 
@@ -217,7 +220,7 @@ impl Coded {
     /// # Errors
     /// [`Error::Parameter`] if the bucket is of another scene or another coding.
     pub fn with_tables(self, plan: &Plan, coding: &Coding, tables: &Tables) -> Result<Self> {
-        plan.check("coded bucket", [self.scene], None)?;
+        plan.check("coded bucket", [self.plan_id], None)?;
         let wrong =
             || Error::parameter("coded bucket", self.bucket, "a bucket whose symbols the tables have");
         let own = tables::Tables::read(&self.tables).map_err(|_| wrong())?;
@@ -235,9 +238,8 @@ impl Coded {
     /// Flips a bit of one byte of the ranges; `at` selects the byte and the bit.
     #[cfg(test)]
     pub(super) fn damage(&mut self, at: usize) {
-        let ranges =
-            self.chunks.iter_mut().flat_map(|chunk| chunk.ranges.iter_mut().map(|range| &mut range.0));
-        let mut bytes: Vec<&mut u8> = ranges.flatten().collect();
+        let ranges = self.chunks.iter_mut().flat_map(|chunk| &mut chunk.ranges);
+        let mut bytes: Vec<&mut u8> = ranges.flat_map(|range| &mut range.bytes).collect();
         let count = bytes.len();
         *bytes[at % count] ^= 1 << (at % 8);
     }
@@ -249,7 +251,7 @@ impl Coded {
         tables: &Tables,
         layers: usize,
     ) -> Result<(Vec<Written>, Vec<CodedLayer>)> {
-        plan.check("coded bucket", [self.scene], None)?;
+        plan.check("coded bucket", [self.plan_id], None)?;
         if self.tables != tables.bytes {
             return Err(Error::parameter("coded bucket", self.bucket, "one with the tables of the file"));
         }

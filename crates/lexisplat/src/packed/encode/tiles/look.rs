@@ -1,31 +1,32 @@
-//! The results of measuring a bucket: weights of its Gaussians, and sums over them.
+//! The results of measuring a bucket: sensitivities of its Gaussians, and sums over them.
 
 use serde::{Deserialize, Serialize};
 
 use super::bucket::Bucket;
 use super::message::messages;
 use super::plan::Plan;
-use crate::packed::bitstream::MeanView;
+use crate::packed::bitstream::PointsOfView;
 use crate::packed::encode::fit::{ColourMoments, Derivatives};
-use crate::packed::encode::octaves::{Histogram, Pairs};
+use crate::packed::encode::octaves::{Histogram, RoundedSensitivities};
 use crate::packed::encode::pack::check;
 use crate::packed::encode::removal::{changes_without, is_worth_its_bits};
-use crate::scene::sensitivity::Sensitivity;
+use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity};
 use crate::stream::Observed;
 use crate::support::error::{Error, Result};
 
-/// Sum of the squared weights that views measure. A guess scales its weights to a sum of 1, but the sum of squares is
-/// smaller where several Gaussians share a pixel or none covers it. Without this factor, files came out 7 to 9 dB better
-/// than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
+/// Sum of the squared sensitivities that views measure. A guess scales its sensitivities to a sum of 1, but the sum of
+/// squares is smaller where several Gaussians share a pixel or none covers it. Without this factor, files came out 7 to 9
+/// dB better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
 pub(crate) const SHOWN: f64 = 0.1;
 
-/// The memory of a measured bucket. It holds the weights of each Gaussian, rounded to eighths of an octave, and whether the
-/// Gaussian stays. It also holds the factor from the observer's weights to these, and the observer's memo.
+/// The memory of a measured bucket. It holds the sensitivities of each Gaussian, rounded to eighths of an octave, and
+/// whether the Gaussian stays. It also holds the factor from the observer's sensitivities to these, and the observer's
+/// memo.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Looked {
-    scene: u32,
+    plan_id: u32,
     bucket: usize,
-    pairs: Pairs,
+    sensitivities: RoundedSensitivities,
     /// One bit for each Gaussian, the lowest first: whether it stays.
     stays: Vec<u8>,
     scale: f32,
@@ -35,13 +36,15 @@ pub struct Looked {
 /// Sums over the Gaussians of a bucket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct LookStatistics {
-    pub(super) scene: u32,
+    pub(super) plan_id: u32,
     pub(super) bucket: usize,
     pub(super) gaussians: u64,
     /// Number of Gaussians that stay.
     pub(super) kept: u64,
-    /// Histograms of the sensitivities to the colour and to the logarithm of the opacity.
-    pub(super) weights: [Histogram; 2],
+    /// Histogram of the sensitivities to the colour.
+    pub(super) colour: Histogram,
+    /// Histogram of the sensitivities to the logarithm of the opacity.
+    pub(super) opacity: Histogram,
     /// Histogram of the sensitivities to the logarithm of the opacity, of the Gaussians that stay.
     pub(super) energies: Histogram,
     pub(super) colours: ColourMoments,
@@ -66,8 +69,8 @@ impl Bucket {
             Some(mut observed) => {
                 observed.check()?;
                 let share = self.splats.len() as f64 / plan.len().max(1) as f64;
-                // All parts have one overall step. A part that asks for half of that step gets four times the weights
-                // instead.
+                // All parts have one overall step. A part that asks for half of that step gets four times the
+                // sensitivities instead.
                 #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
                 let scale = (share / observed.step_factor.powi(2)) as f32;
                 observed.sensitivity.scale(scale);
@@ -76,35 +79,36 @@ impl Bucket {
         };
         check(&self.splats, &sensitivity)?;
         let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
-        Ok((statistics, looked.with_observer(scale, memo)))
+        Ok((statistics, Looked { scale, memo, ..looked }))
     }
 }
 
 impl LookStatistics {
     pub(super) fn of(bucket: &Bucket, found: &Sensitivity, plan: &Plan) -> (Self, Looked) {
-        let (scene, splats) = (plan.scene(), &bucket.splats);
+        let splats = &bucket.splats;
         let changes = changes_without(&splats.geometry, found, plan.options.may_change());
         let stays: Vec<bool> = changes.into_iter().map(|c| is_worth_its_bits(c, plan.step)).collect();
-        let looked = Looked::new(scene, bucket.number, &found.appearances(), &stays);
+        let looked = Looked::new(plan.id(), bucket.number, &found.appearances(), &stays);
         let mut out = Self {
-            scene,
+            plan_id: plan.id(),
             bucket: bucket.number,
             gaussians: splats.len() as u64,
             kept: stays.iter().filter(|&&stays| stays).count() as u64,
-            weights: Default::default(),
+            colour: Histogram::default(),
+            opacity: Histogram::default(),
             energies: Histogram::default(),
             colours: ColourMoments::default(),
             derivatives: Derivatives::default(),
         };
-        for ([colour, opacity], stays) in looked.pairs.iter().zip(&stays) {
-            out.weights[0].add(colour);
-            out.weights[1].add(opacity);
+        for (AppearanceSensitivity { colour, opacity }, stays) in looked.sensitivities.iter().zip(&stays) {
+            out.colour.add(colour);
+            out.opacity.add(opacity);
             if *stays {
                 out.energies.add(opacity);
             }
         }
-        out.colours.add(&MeanView::new(&plan.options.viewpoints).colours(splats));
-        out.derivatives.add(&splats.geometry, found, &bucket.scene());
+        out.colours.add(&PointsOfView::new(&plan.options.points_of_view).colours(splats));
+        out.derivatives.add(&splats.geometry, found, &bucket.keys());
         (out, looked)
     }
 
@@ -112,7 +116,8 @@ impl LookStatistics {
     pub(super) fn merge(&mut self, next: &Self) {
         self.gaussians += next.gaussians;
         self.kept += next.kept;
-        self.weights.iter_mut().zip(&next.weights).for_each(|(sum, more)| sum.merge(more));
+        self.colour.merge(&next.colour);
+        self.opacity.merge(&next.opacity);
         self.energies.merge(&next.energies);
         self.colours.merge(&next.colours);
         self.derivatives.merge(&next.derivatives);
@@ -120,21 +125,28 @@ impl LookStatistics {
 }
 
 impl Looked {
-    fn new(scene: u32, bucket: usize, weights: &[[f32; 2]], stays: &[bool]) -> Self {
+    fn new(plan_id: u32, bucket: usize, sensitivities: &[AppearanceSensitivity], stays: &[bool]) -> Self {
         let mut bits = vec![0; stays.len().div_ceil(8)];
         for (i, _) in stays.iter().enumerate().filter(|(_, stays)| **stays) {
             bits[i / 8] |= 1_u8 << (i % 8);
         }
-        Self { scene, bucket, pairs: Pairs::of(weights), stays: bits, scale: 1.0, memo: Vec::new() }
+        Self {
+            plan_id,
+            bucket,
+            sensitivities: RoundedSensitivities::of(sensitivities),
+            stays: bits,
+            scale: 1.0,
+            memo: Vec::new(),
+        }
     }
 
-    pub(super) fn with_observer(self, scale: f32, memo: Vec<u8>) -> Self {
-        Self { scale, memo, ..self }
-    }
-
-    /// Returns the observer's own weights. `weights` are those that the scene has.
-    pub(super) fn observed(&self, weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
-        weights.iter().map(|own| own.map(|weight| weight / self.scale)).collect()
+    /// Returns the observer's own sensitivities, given the `scaled` ones.
+    pub(super) fn observed(&self, scaled: &[AppearanceSensitivity]) -> Vec<AppearanceSensitivity> {
+        let own = |s: &AppearanceSensitivity| AppearanceSensitivity {
+            colour: s.colour / self.scale,
+            opacity: s.opacity / self.scale,
+        };
+        scaled.iter().map(own).collect()
     }
 
     /// Returns the memo of [`Observed`](crate::stream::Observed).
@@ -143,7 +155,7 @@ impl Looked {
         &self.memo
     }
 
-    /// Returns the weights of each Gaussian, and whether it stays. With `first_stays`, the first Gaussian stays in any
+    /// Returns the sensitivities of each Gaussian, and whether it stays. With `first_stays`, the first Gaussian stays in any
     /// case.
     ///
     /// # Errors
@@ -153,20 +165,20 @@ impl Looked {
         plan: &Plan,
         bucket: &Bucket,
         first_stays: bool,
-    ) -> Result<(Vec<[f32; 2]>, Vec<bool>)> {
-        plan.check("looked", [self.scene], None)?;
+    ) -> Result<(Vec<AppearanceSensitivity>, Vec<bool>)> {
+        plan.check("looked", [self.plan_id], None)?;
         let count = bucket.splats.len();
         if self.bucket != bucket.number {
             let expected = format!("of bucket {}", bucket.number);
             return Err(Error::parameter("looked", format!("of bucket {}", self.bucket), expected));
         }
-        if self.pairs.len() != count || self.stays.len() != count.div_ceil(8) {
-            return Err(Error::parameter("looked", self.pairs.len(), format!("{count} Gaussians")));
+        if self.sensitivities.len() != count || self.stays.len() != count.div_ceil(8) {
+            return Err(Error::parameter("looked", self.sensitivities.len(), format!("{count} Gaussians")));
         }
         let mut stays: Vec<bool> = (0..count).map(|i| self.stays[i / 8] >> (i % 8) & 1 == 1).collect();
         if let Some(first) = stays.first_mut() {
             *first |= first_stays;
         }
-        Ok((self.pairs.iter().collect(), stays))
+        Ok((self.sensitivities.iter().collect(), stays))
     }
 }

@@ -19,9 +19,9 @@
 //! | [`Coded::with_tables`] | bucket | the tables | [`Coded`] with these tables |
 //! | [`Assembly`] | file | all of these | the file |
 //!
-//! Statistics are sums. They are added in the order of blocks, buckets and groups, in whatever order they were found. So
-//! one process, many threads and many machines make the same bytes. Every type that passes between steps has `to_bytes` and
-//! `from_bytes`. [`stream::pack`](crate::stream::pack) takes all steps in one process.
+//! Statistics are sums. They are added in the order of blocks, buckets and groups, which need not be the order in which
+//! they were computed. So one process, many threads and many machines make the same bytes. Every type that passes between
+//! steps has `to_bytes` and `from_bytes`. [`stream::pack`](crate::stream::pack) takes all steps in one process.
 
 mod assembly;
 mod bucket;
@@ -35,7 +35,7 @@ mod survey;
 #[cfg(test)]
 mod tests;
 
-pub use assembly::Assembly;
+pub use assembly::{Assembly, PackedFile};
 pub use bucket::{Bucket, BucketReader};
 pub use coding::{Coded, Coding, Counts, Tables};
 pub(crate) use look::SHOWN;

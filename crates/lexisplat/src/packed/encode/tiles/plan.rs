@@ -36,7 +36,7 @@ const RUN: usize = 4096;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Plan {
     /// Identifies the plan: a checksum of everything else in it.
-    scene: u32,
+    id: u32,
     pub(super) options: PackOptions,
     /// The overall step for which the scene is packed.
     pub(super) step: f64,
@@ -123,17 +123,17 @@ impl Plan {
             let gaussians = if one_each { firsts[list + 1] - firsts[list] } else { total };
             let from = keys.partition_point(|key| key.0 < list);
             let own = &keys[from..keys.partition_point(|key| key.0 <= list)];
-            let parts = usize::try_from(gaussians).unwrap_or(usize::MAX).div_ceil(bucket);
-            (1..parts).filter_map(|k| own.get(k * own.len() / parts)).map(|key| key.1).collect()
+            let count = usize::try_from(gaussians).unwrap_or(usize::MAX).div_ceil(bucket);
+            (1..count).filter_map(|k| own.get(k * own.len() / count)).map(|key| key.1).collect()
         };
         let ends = (0..count).map(ends_of).collect();
         let step = expected_step(gaussians, decibels);
         let mut plan =
-            Self { scene: 0, options: options.clone(), step, firsts, grid, guessed_total, kind, ends };
+            Self { id: 0, options: options.clone(), step, firsts, grid, guessed_total, kind, ends };
         // The bytes of a message end with their own checksum. A checksum over all of them would be the same for any
         // message.
         let bytes = plan.to_bytes();
-        plan.scene = crc32::hash(bytes.split_last_chunk::<{ message::CHECKSUM }>().map_or(&[], |b| b.0));
+        plan.id = crc32::hash(bytes.split_last_chunk::<{ message::CHECKSUM }>().map_or(&[], |b| b.0));
         Ok(plan)
     }
 
@@ -144,23 +144,23 @@ impl Plan {
     }
 
     /// Returns the number that identifies the plan. Every message that is made by the plan holds it.
-    pub(super) fn scene(&self) -> u32 {
-        self.scene
+    pub(super) fn id(&self) -> u32 {
+        self.id
     }
 
-    /// Refuses messages of the type `kind` if one of `scenes` is of another plan, or if their number is not `expected`.
+    /// Refuses messages of the type `kind` if one of `plan_ids` is of another plan, or if their number is not `expected`.
     pub(super) fn check(
         &self,
         kind: &'static str,
-        scenes: impl IntoIterator<Item = u32>,
+        plan_ids: impl IntoIterator<Item = u32>,
         expected: Option<usize>,
     ) -> Result<()> {
-        let scenes: Vec<u32> = scenes.into_iter().collect();
-        if scenes.iter().any(|&scene| scene != self.scene) {
+        let plan_ids: Vec<u32> = plan_ids.into_iter().collect();
+        if plan_ids.iter().any(|&id| id != self.id) {
             return Err(Error::parameter(kind, "of another scene", "of this scene"));
         }
-        match expected.filter(|&expected| expected != scenes.len()) {
-            Some(expected) => Err(Error::parameter(kind, scenes.len(), format!("all {expected}"))),
+        match expected.filter(|&expected| expected != plan_ids.len()) {
+            Some(expected) => Err(Error::parameter(kind, plan_ids.len(), format!("all {expected}"))),
             None => Ok(()),
         }
     }
@@ -294,7 +294,7 @@ impl Plan {
             }
             Ok(())
         })?;
-        let of = |(bucket, piece)| (bucket, Piece { scene: self.scene, bucket, ..piece }.to_bytes());
+        let of = |(bucket, piece)| (bucket, Piece { plan_id: self.id, bucket, ..piece }.to_bytes());
         Ok(pieces.into_iter().map(of).collect())
     }
 
@@ -385,7 +385,7 @@ impl Buckets<'_> {
 /// The rows of one bucket that are in one block of a tile.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Piece {
-    pub(super) scene: u32,
+    pub(super) plan_id: u32,
     pub(super) bucket: usize,
     pub(super) places: Vec<MortonKey>,
     pub(super) rows: Vec<u8>,

@@ -8,11 +8,12 @@ use super::look::Looked;
 use super::message::messages;
 use super::plan::Plan;
 use super::steps::Steps;
-use crate::packed::bitstream::MeanView;
+use crate::packed::bitstream::PointsOfView;
 use crate::packed::curve::MortonKey;
 use crate::packed::encode::coder::{OrderedGaussians, SAMPLE, SAMPLE_STREAM};
 use crate::packed::encode::fit::Predictors;
 use crate::packed::encode::octaves::Histogram;
+use crate::scene::sensitivity::AppearanceSensitivity;
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 use crate::support::rng::SplitMix64;
@@ -25,24 +26,24 @@ const RUN: usize = 2048;
 /// A sample of the Gaussians of a group of buckets.
 #[derive(Debug, Default)]
 pub struct Sample {
-    parts: Vec<Part>,
+    buckets: Vec<BucketSample>,
 }
 
 /// The sample of one bucket.
 #[derive(Debug)]
-struct Part {
-    bucket: usize,
+struct BucketSample {
+    number: usize,
     splats: Splats,
     /// The cell of each Gaussian, and its number in `splats`.
-    scene: Vec<MortonKey>,
-    weights: Vec<[f32; 2]>,
+    keys: Vec<MortonKey>,
+    sensitivities: Vec<AppearanceSensitivity>,
     stays: Vec<bool>,
 }
 
 /// Sums over the sample of a group, and the rows that a dictionary is learned from.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SampleStatistics {
-    scene: u32,
+    plan_id: u32,
     pub(super) predictors: Predictors,
     /// Most octaves by which the shape of a Gaussian asks for smaller steps than those of class 0.
     pub(super) over: f32,
@@ -70,7 +71,7 @@ impl Sample {
     /// [`Error::Parameter`] if `looked` is of another bucket.
     pub fn add(&mut self, plan: &Plan, bucket: &Bucket, looked: &Looked) -> Result<()> {
         let n = bucket.splats.len();
-        let (weights, stays) = looked.of_each(plan, bucket, false)?;
+        let (sensitivities, stays) = looked.of_each(plan, bucket, false)?;
         // One of `every` runs is taken. In the next bucket it is the next run.
         let share = plan.sampled() as f64 / plan.buckets().max(1) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
@@ -82,12 +83,12 @@ impl Sample {
         splats.retain(&keep);
         splats.shrink_to_fit();
         let taken = || (0..n).filter(|&i| keep[i]);
-        let scene = (0..).zip(taken()).map(|(source, i)| MortonKey { source, ..bucket.places[i] }).collect();
-        self.parts.push(Part {
-            bucket: bucket.number,
+        let keys = (0..).zip(taken()).map(|(source, i)| MortonKey { source, ..bucket.places[i] }).collect();
+        self.buckets.push(BucketSample {
+            number: bucket.number,
             splats,
-            scene,
-            weights: taken().map(|i| weights[i]).collect(),
+            keys,
+            sensitivities: taken().map(|i| sensitivities[i]).collect(),
             stays: taken().map(|i| stays[i]).collect(),
         });
         Ok(())
@@ -98,16 +99,16 @@ impl Sample {
     /// # Errors
     /// [`Error::Parameter`] if `steps` are of another scene.
     pub fn statistics(&self, plan: &Plan, steps: &Steps) -> Result<SampleStatistics> {
-        plan.check("steps", [steps.scene], None)?;
+        plan.check("steps", [steps.plan_id], None)?;
         let mut out = SampleStatistics::none(plan);
-        let mean_view = MeanView::new(&plan.options.viewpoints);
+        let points_of_view = PointsOfView::new(&plan.options.points_of_view);
         let parameters = &steps.floor.parameters;
-        for part in &self.parts {
-            let dc = mean_view.colours(&part.splats);
-            let classes = steps.steps.classes_of(&part.weights);
-            out.predictors.add(&part.splats.geometry, &dc, &part.scene, &classes, parameters);
-            let kept: Vec<MortonKey> = part.kept().map(|i| part.scene[i]).collect();
-            out.over = out.over.max(steps.floor.over(&part.splats.geometry, &kept));
+        for bucket in &self.buckets {
+            let dc = points_of_view.colours(&bucket.splats);
+            let classes = steps.steps.classes_of(&bucket.sensitivities);
+            out.predictors.add(&bucket.splats.geometry, &dc, &bucket.keys, &classes, parameters);
+            let kept: Vec<MortonKey> = bucket.kept().map(|i| bucket.keys[i]).collect();
+            out.over = out.over.max(steps.floor.over(&bucket.splats.geometry, &kept));
             for dc in &dc {
                 let largest = parameters.dc_coordinates(*dc).into_iter();
                 out.dc.add(largest.fold(0.0_f32, |most, x| most.max(x.abs())));
@@ -124,18 +125,18 @@ impl Sample {
         let sampled = (0..plan.groups()).flat_map(|group| plan.group(group));
         let all_kept = sampled.map(kept).sum::<f64>().max(1.0);
         let parameters = steps.floor.parameters.for_learning();
-        for part in &self.parts {
-            let scene: Vec<MortonKey> = part.kept().map(|i| part.scene[i]).collect();
-            let weights: Vec<[f32; 2]> = part.kept().map(|i| part.weights[i]).collect();
-            let free = steps.steps.classes_of(&weights);
-            let classes = steps.floor.classes(&free, &part.splats.geometry, &scene);
-            let view = OrderedGaussians::new(&part.splats, &scene, &classes);
-            let share = kept(part.bucket) / all_kept;
+        for bucket in &self.buckets {
+            let keys: Vec<MortonKey> = bucket.kept().map(|i| bucket.keys[i]).collect();
+            let sensitivities: Vec<_> = bucket.kept().map(|i| bucket.sensitivities[i]).collect();
+            let free = steps.steps.classes_of(&sensitivities);
+            let classes = steps.floor.classes(&free, &bucket.splats.geometry, &keys);
+            let ordered = OrderedGaussians::new(&bucket.splats, &keys, &classes);
+            let share = kept(bucket.number) / all_kept;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share")]
             let wanted = (SAMPLE as f64 * share).round() as usize;
-            let seed = plan.options.seed ^ SAMPLE_STREAM ^ part.bucket as u64;
-            let chosen = SplitMix64::new(seed).shuffled(scene.len()).take(wanted);
-            let (rows, mut classes) = view.scaled(chosen, &parameters);
+            let seed = plan.options.seed ^ SAMPLE_STREAM ^ bucket.number as u64;
+            let chosen = SplitMix64::new(seed).shuffled(keys.len()).take(wanted);
+            let (rows, mut classes) = ordered.scaled(chosen, &parameters);
             out.rows.extend(rows.into_iter().flat_map(half_bytes));
             out.classes.append(&mut classes);
         }
@@ -148,16 +149,16 @@ fn half_bytes(x: f32) -> [u8; 2] {
     f16::from_f32(x.clamp(-most, most)).to_le_bytes()
 }
 
-impl Part {
+impl BucketSample {
     fn kept(&self) -> impl Iterator<Item = usize> {
-        (0..self.scene.len()).filter(|&i| self.stays[i])
+        (0..self.keys.len()).filter(|&i| self.stays[i])
     }
 }
 
 impl SampleStatistics {
     fn none(plan: &Plan) -> Self {
         Self {
-            scene: plan.scene(),
+            plan_id: plan.id(),
             predictors: Predictors::default(),
             over: 0.0,
             dc: Histogram::default(),
@@ -168,7 +169,7 @@ impl SampleStatistics {
 
     /// Returns the sums and the rows of all groups, which are in order.
     pub(super) fn sum(plan: &Plan, groups: &[Self]) -> Result<Self> {
-        plan.check("sample statistics", groups.iter().map(|group| group.scene), Some(plan.groups()))?;
+        plan.check("sample statistics", groups.iter().map(|group| group.plan_id), Some(plan.groups()))?;
         let mut out = Self::none(plan);
         for group in groups {
             out.predictors.merge(&group.predictors);

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::look::LookStatistics;
 use super::message::messages;
 use super::plan::Plan;
+use crate::packed::bitstream::parameters::ColourAndShape;
 use crate::packed::encode::codebook::StopRule;
 use crate::packed::encode::coder::promise;
 use crate::packed::encode::fit::{self, Classes};
@@ -15,7 +16,7 @@ use crate::support::error::{Error, Result};
 /// The steps of a scene, without predictors and without the dictionary.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Steps {
-    pub(super) scene: u32,
+    pub(super) plan_id: u32,
     pub(super) steps: fit::Steps,
     /// The limits of steps, without those that depend on the shapes of Gaussians.
     pub(super) floor: Floor,
@@ -35,7 +36,7 @@ impl Steps {
     /// # Errors
     /// [`Error::Parameter`] if `buckets` are not the statistics of all buckets, in order.
     pub fn new(plan: &Plan, buckets: &[LookStatistics]) -> Result<Self> {
-        plan.check("look statistics", buckets.iter().map(|bucket| bucket.scene), Some(plan.buckets()))?;
+        plan.check("look statistics", buckets.iter().map(|bucket| bucket.plan_id), Some(plan.buckets()))?;
         let in_order = buckets.iter().enumerate().all(|(number, bucket)| bucket.bucket == number);
         let Some((first, rest)) = buckets.split_first().filter(|_| in_order) else {
             return Err(Error::parameter("look statistics", "in another order", "in the order of buckets"));
@@ -51,15 +52,18 @@ impl Steps {
                 kept[bucket] = 1;
             }
         }
-        let kinds = [0, 1].map(|kind| Classes::of_histogram(&all.weights[kind]));
-        let steps = fit::Steps::new(&plan.grid, kinds, all.colours.axes(), &all.derivatives);
+        let classes = ColourAndShape {
+            colour: Classes::of_histogram(&all.colour),
+            shape: Classes::of_histogram(&all.opacity),
+        };
+        let steps = fit::Steps::new(&plan.grid, classes, all.colours.axes(), &all.derivatives);
         let mut parameters = steps.with_step(plan.step);
         let stop = promise(&mut parameters, plan.options.tolerance);
         let of_file = kept.iter().sum::<u64>() / plan.files().len().max(1) as u64;
         let of_file = usize::try_from(of_file).unwrap_or(usize::MAX);
         let layering = Layering::new(of_file, &plan.options, all.energies.iter());
         Ok(Self {
-            scene: plan.scene(),
+            plan_id: plan.id(),
             steps,
             floor: Floor::begin(parameters),
             layering,

@@ -17,7 +17,7 @@ use crate::support::rng::SplitMix64;
 
 /// Most rows of a survey.
 pub const BLOCK: usize = 262_144;
-/// Number of rows of which the position of one is kept. The grid and the buckets depend on these positions.
+/// Number of rows for each kept position. The grid and the buckets depend on these positions.
 pub(super) const STRIDE: usize = 128;
 /// Mixed into the seed with which rows are chosen.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;

@@ -212,7 +212,7 @@ fn damaged_messages_and_those_of_other_scenes_are_refused() {
 }
 
 #[test]
-fn a_bucket_that_asks_for_half_the_step_weighs_four_times_as_much() {
+fn a_bucket_that_asks_for_half_the_step_has_four_times_the_sensitivity() {
     let tiles = [scene(3000, 4), scene(1000, 5)];
     let plan = Plan::with_bucket(&surveys(&tiles), &options(), 38.0, true, SMALL).unwrap();
     let mut reader = BucketReader::new(&plan, 0);
@@ -222,20 +222,21 @@ fn a_bucket_that_asks_for_half_the_step_weighs_four_times_as_much() {
     let looked = |step_factor: f64| {
         bucket.look(&plan, Some(Observed { step_factor, ..own.clone().into() })).map(|pair| pair.1)
     };
-    let weights = |looked: &Looked| looked.of_each(&plan, &bucket, false).unwrap().0;
+    let sensitivities = |looked: &Looked| looked.of_each(&plan, &bucket, false).unwrap().0;
     let (usual, half) = (looked(1.0).unwrap(), looked(0.5).unwrap());
-    for ((own, usual), half) in own.appearances().iter().zip(weights(&usual)).zip(weights(&half)) {
-        // Weights are rounded to an eighth of an octave.
+    for ((own, usual), half) in own.appearances().iter().zip(sensitivities(&usual)).zip(sensitivities(&half))
+    {
+        // Sensitivities are rounded to an eighth of an octave.
         let is_about = |a: f32, b: f32| (a / b).log2().abs() < 0.07;
         assert!(
-            is_about(usual[0], 0.75 * own[0]) && is_about(half[0], 4.0 * usual[0]),
+            is_about(usual.colour, 0.75 * own.colour) && is_about(half.colour, 4.0 * usual.colour),
             "{own:?} {usual:?} {half:?}"
         );
     }
-    // The observer gets its own weights back.
-    let again = [half.observed(&weights(&half)), usual.observed(&weights(&usual))];
+    // The observer gets its own sensitivities back.
+    let again = [half.observed(&sensitivities(&half)), usual.observed(&sensitivities(&usual))];
     for (a, b) in again[0].iter().zip(&again[1]) {
-        assert!((a[1] / b[1]).log2().abs() < 0.07, "{a:?} {b:?}");
+        assert!((a.opacity / b.opacity).log2().abs() < 0.07, "{a:?} {b:?}");
     }
     for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(looked(wrong).unwrap_err().to_string().contains("step factor"));

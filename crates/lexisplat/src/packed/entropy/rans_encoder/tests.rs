@@ -106,8 +106,8 @@ impl<'a> Naive<'a> {
             };
         let low = self.state % whole;
         for &symbol in &self.symbols[place] {
-            let model = self.tables.model(place, symbol);
-            let (start, share) = (u64::from(model.start), u64::from(model.share));
+            let interval = self.tables.interval(place, symbol);
+            let (start, share) = (u64::from(interval.start), u64::from(interval.share));
             if (start..start + share).contains(&low) {
                 self.state = share * (self.state / whole) + low - start;
                 self.refill();

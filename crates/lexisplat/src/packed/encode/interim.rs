@@ -27,7 +27,7 @@ const NEIGHBOURS: usize = 16;
 
 /// The interim changes of all layers but the last.
 #[derive(Debug, Default)]
-pub(in crate::packed) struct Alone {
+pub(in crate::packed) struct InterimChanges {
     /// For each Gaussian of these layers, the number of steps by which its scales grow.
     growth: Vec<i32>,
     /// For each of these Gaussians, the number of steps by which its opacity grows if there are no changes from pictures.
@@ -36,7 +36,7 @@ pub(in crate::packed) struct Alone {
     layers: usize,
 }
 
-impl Alone {
+impl InterimChanges {
     /// Computes the changes of the Gaussians at `places` of `g`. `places` holds all layers in the order of the file, and
     /// `layers` the number of Gaussians of each. `probability(layer, i)` is the probability with which Gaussian `i` of
     /// `places` was drawn into `layer`.
@@ -46,20 +46,20 @@ impl Alone {
         layers: &[usize],
         probability: impl Fn(usize, usize) -> f64,
     ) -> Self {
-        let mut alone = Self { layers: layers.len().saturating_sub(1), ..Self::default() };
+        let mut changes = Self { layers: layers.len().saturating_sub(1), ..Self::default() };
         let mut start = 0;
-        for (layer, count) in layers.iter().enumerate().take(alone.layers) {
+        for (layer, count) in layers.iter().enumerate().take(changes.layers) {
             let end = start + count;
             let missing = missing(g, &places[start..], *count);
             for (i, x) in (start..end).zip(missing) {
                 let rare = libm::log(probability(layer, i).max(f64::MIN_POSITIVE));
                 let grows = GROWTH * libm::log1p(MISSING * x) + RARE * rare;
-                alone.growth.push(steps(grows.clamp(0.0, MOST_GROWTH * STEPS[0]), STEPS[0]));
-                alone.opacity.push(steps(OPACITY * libm::log1p(x), STEPS[1]));
+                changes.growth.push(steps(grows.clamp(0.0, MOST_GROWTH * STEPS[0]), STEPS[0]));
+                changes.opacity.push(steps(OPACITY * libm::log1p(x), STEPS[1]));
             }
             start = end;
         }
-        alone
+        changes
     }
 
     /// Returns whether the Gaussians of `layer` have interim changes.
@@ -67,8 +67,8 @@ impl Alone {
         layer < self.layers
     }
 
-    /// Returns the interim changes, in steps, of Gaussian `i` in the order of the file. `change` is what fitting to
-    /// pictures asks for, if there was any.
+    /// Returns the interim changes, in steps, of Gaussian `i` in the order of the file. `change` is the result of
+    /// fitting to pictures, if there was any.
     pub(in crate::packed) fn steps(
         &self,
         i: usize,

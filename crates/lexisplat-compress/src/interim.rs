@@ -35,7 +35,7 @@ const MOST_LOG_SCALE: f32 = 0.8;
 ///
 /// # Errors
 /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-pub(crate) fn alone(
+pub(crate) fn interim_changes(
     mut splats: Splats,
     cameras: &[Camera],
     targets: &[Image],
@@ -50,25 +50,25 @@ pub(crate) fn alone(
     let (targets, cameras): (Vec<Image>, Vec<Camera>) = some.map(shrink).unzip();
     // The views are drawn once for the errors and once in each step.
     progress.begin(Stage::Draw, (SOLUTIONS * (1 + STEPS) * cameras.len()) as u64);
-    let parts = &OneStep(progress);
+    let rounds = &OneStep(progress);
     let mut changes = vec![AppearanceChange::default(); splats.len()];
     let make = |splats: &mut Splats, i: usize, change: AppearanceChange| -> AppearanceChange {
         let change = change.rounded();
         change.make(&mut splats.geometry, i);
         change
     };
-    let sizes = nearest::<5>(&splats, &cameras, &targets, parts)?;
+    let sizes = nearest::<5>(&splats, &cameras, &targets, rounds)?;
     for (i, found) in sizes.iter().enumerate() {
         let log_scale = found[4].clamp(-MOST_LOG_SCALE, MOST_LOG_SCALE);
         changes[i] = make(&mut splats, i, AppearanceChange { log_scale, ..Default::default() });
     }
-    let opacities = nearest::<4>(&splats, &cameras, &targets, parts)?;
+    let opacities = nearest::<4>(&splats, &cameras, &targets, rounds)?;
     for (i, found) in opacities.iter().enumerate() {
         let log_opacity = found[3].clamp(-MOST_LOG_OPACITY, MOST_LOG_OPACITY);
         let change = make(&mut splats, i, AppearanceChange { log_opacity, ..Default::default() });
         changes[i].log_opacity = change.log_opacity;
     }
-    let colours = nearest::<3>(&splats, &cameras, &targets, parts)?;
+    let colours = nearest::<3>(&splats, &cameras, &targets, rounds)?;
     for (change, found) in changes.iter_mut().zip(&colours) {
         change.dc = found.map(|v| v / C0);
     }
@@ -154,7 +154,7 @@ mod tests {
         };
         let fitting = views.fitting(&splats);
         let originals = drawn(&splats, &fitting);
-        let changes = alone(grown.clone(), &fitting, &originals, &Silent).unwrap();
+        let changes = interim_changes(grown.clone(), &fitting, &originals, &Silent).unwrap();
         assert!(changes.iter().any(|change| change.log_scale != 0.0));
         let mut fitted = grown.clone();
         for (i, change) in changes.iter().enumerate() {

@@ -1,8 +1,8 @@
-//! Base colours that are averages over points of view.
+//! Base colours that are averages over points of points.
 //!
 //! In the source, the base colour of a Gaussian is the average of its colour over all directions. A Gaussian is seen from
-//! few directions, so a file holds the average colour from a few points of view. The decoder subtracts what the SH-rest
-//! that is there adds to that average. So a Gaussian has its best colour with and without its SH-rest.
+//! few directions, so a file holds the average colour from a few points of points. The decoder subtracts the share of the
+//! decoded SH-rest in that average. So a Gaussian has its best colour with and without its SH-rest.
 
 use super::bytes::nearest_f24;
 use super::halves::doubled;
@@ -14,14 +14,14 @@ use crate::sparse::dictionary::Dictionary;
 use crate::support::maths::{Vec3, at_share};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
-/// Largest number of points of view.
+/// Largest number of points of points.
 pub(in crate::packed) const MAX_POINTS: usize = 15;
 /// Largest number of coefficients of one channel of SH-rest.
 pub(in crate::packed) const MOST: usize = MAX_COEFFICIENTS - 1;
 
-/// The points of view of a file. Without points, base colours are those of the source. Their coordinates are f24.
+/// The points of view of a file. Without points, base colours are those of the source. Coordinates of points are f24.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::packed) struct MeanView {
+pub(in crate::packed) struct PointsOfView {
     pub(in crate::packed) points: Vec<Vec3>,
     /// Distance from a point, in world units, below which directions shrink towards zero.
     pub(in crate::packed) softening: f32,
@@ -33,7 +33,7 @@ const SOFTENING: f32 = 0.02;
 const LEAST_SOFTENING: f32 = 1e-15;
 /// Largest difference of a coordinate of a position and of a point that counts, 2^60. Sums of its squares are finite.
 const MOST_DIFFERENCE: f32 = f32::from_bits((127 + 60) << 23);
-/// Range of the softening of a file, 2^-60 to 2^60. Its square is a normal number.
+/// Limits of the softening of a file, 2^-60 to 2^60. Its square is a normal number.
 pub(in crate::packed) const SOFTENINGS: std::ops::RangeInclusive<f32> =
     f32::from_bits((127 - 60) << 23)..=MOST_DIFFERENCE;
 
@@ -43,8 +43,8 @@ fn difference(position: f32, point: f32) -> f32 {
     (position - point).clamp(-MOST_DIFFERENCE, MOST_DIFFERENCE)
 }
 
-impl MeanView {
-    /// Creates a view from the first [`MAX_POINTS`] of `points`, rounded as a file holds them.
+impl PointsOfView {
+    /// Takes the first [`MAX_POINTS`] of `points`, rounded as a file holds them.
     pub(in crate::packed) fn new(points: &[Vec3]) -> Self {
         if points.is_empty() {
             return Self::default();
@@ -82,7 +82,7 @@ impl MeanView {
             return splats.geometry.dc.clone();
         }
         let per_channel = splats.degree.rest_per_channel();
-        let parts = map_chunks(splats.len(), GAUSSIANS_PER_TASK, |range| {
+        let tasks = map_chunks(splats.len(), GAUSSIANS_PER_TASK, |range| {
             let colour = |i: usize| {
                 let weights = self.weights(splats.degree, splats.geometry.positions[i]);
                 let added = seen_row(splats.rest(i), weights.get(..per_channel).unwrap_or_default());
@@ -90,7 +90,7 @@ impl MeanView {
             };
             range.map(colour).collect::<Vec<Vec3>>()
         });
-        parts.concat()
+        tasks.concat()
     }
 
     /// Stores in `out` the [`Self::weights`] of the positions of all lanes. Entries beyond the coefficients of the degree
@@ -151,10 +151,10 @@ pub(in crate::packed) struct SeenAtoms {
 }
 
 impl SeenAtoms {
-    /// Prepares the atoms of `dictionary`. The result is empty if there are no points of view.
-    pub(in crate::packed) fn new(view: &MeanView, dictionary: &Dictionary) -> Self {
+    /// Prepares the atoms of `dictionary`. The result is empty if there are no points of points.
+    pub(in crate::packed) fn new(points: &PointsOfView, dictionary: &Dictionary) -> Self {
         let per_channel = dictionary.degree().rest_per_channel();
-        if view.points.is_empty() || per_channel == 0 {
+        if points.points.is_empty() || per_channel == 0 {
             return Self::default();
         }
         let row = |atom: &[f32]| -> Vec<[f32; CHANNELS + 1]> {
@@ -217,17 +217,17 @@ mod tests {
     fn weights_are_finite_wherever_points_are() {
         let degree = ShDegree::THREE;
         for points in [vec![[1.0, 2.0, 3.0]], vec![[1.0, 2.0, 3.0]; 8], vec![[0.0; 3], [1.0, 2.0, 3.0]]] {
-            let view = MeanView::new(&points);
+            let points = PointsOfView::new(&points);
             for position in
                 [[1.0, 2.0, 3.0], [0.0; 3], [1e30; 3], [f32::MAX, 0.0, f32::MIN], [1.0, 2.0, 3.000_001]]
             {
                 assert!(
-                    view.weights(degree, position).iter().all(|w| w.is_finite()),
+                    points.weights(degree, position).iter().all(|w| w.is_finite()),
                     "{points:?} {position:?}"
                 );
             }
         }
-        assert_eq!(MeanView::new(&[]), MeanView::default());
+        assert_eq!(PointsOfView::new(&[]), PointsOfView::default());
     }
 
     /// Coordinates of any size give the weights of directions in f64, with differences limited to 2^60.
@@ -237,7 +237,7 @@ mod tests {
         let points = [[1e19, 0.0, 1e18], [-3e19, 1e19, 0.0], [0.0, f32::MAX, -1e30], [0.0, 0.0, 1e-20]];
         for point in points {
             for position in [[0.0; 3], [1e18, -2e18, 5e17], [f32::MAX, f32::MIN, 1.0], [3e19, 1e19, -1e19]] {
-                let view = MeanView { points: vec![point], softening: *SOFTENINGS.start() };
+                let points = PointsOfView { points: vec![point], softening: *SOFTENINGS.start() };
                 let limit = f64::from(MOST_DIFFERENCE);
                 let d: [f64; 3] = std::array::from_fn(|k| {
                     (f64::from(position[k]) - f64::from(point[k])).clamp(-limit, limit)
@@ -252,7 +252,7 @@ mod tests {
                     (3, 1.092_548_4 * x * y),
                     (5, 0.315_391_57 * (2.0 * z * z - x * x - y * y)),
                 ];
-                let found = view.weights(degree, position);
+                let found = points.weights(degree, position);
                 for (k, b) in wanted {
                     let off = f64::from(found[k]) - b / f64::from(C0);
                     assert!(off.abs() < 1e-5, "{point:?} {position:?} {k}: {off}");
@@ -265,8 +265,8 @@ mod tests {
     #[test]
     fn weights_are_those_of_directions() {
         let degree = ShDegree::new(2).unwrap();
-        let view = MeanView::new(&[[3.0, 0.0, 0.0], [0.0, -4.0, 0.0]]);
-        let found = view.weights(degree, [0.0; 3]);
+        let points = PointsOfView::new(&[[3.0, 0.0, 0.0], [0.0, -4.0, 0.0]]);
+        let found = points.weights(degree, [0.0; 3]);
         let (a, b) = (rest_basis(degree, [-1.0, 0.0, 0.0]), rest_basis(degree, [0.0, 1.0, 0.0]));
         for ((found, a), b) in found.iter().zip(a).zip(b) {
             assert!((found * C0 - 0.5 * (a + b)).abs() < 1e-3, "{found} {a} {b}");

@@ -46,20 +46,20 @@ pub(in crate::packed) fn interim<S: Symbols>(
     }
 }
 
-/// Adds the interim changes to `values` in the lanes where `alone` is true.
+/// Adds the interim changes to `values` in the lanes of `lanes`.
 #[inline(always)]
 pub(in crate::packed) fn change(
     values: &mut [Lanes; TARGETS],
     interim: &[Lanes; CHANGES],
     steps: &[u32; KINDS],
-    alone: &Lanes<bool>,
+    lanes: &Lanes<bool>,
 ) {
     for (t, values) in values.iter_mut().enumerate() {
         // One change is for all three scales.
         let k = (t + 1).saturating_sub(OPACITY);
         let step = steps[kind(k)].cast_signed();
         for l in 0..LANES {
-            let by = if alone[l] { interim[k][l].wrapping_mul(step) } else { 0 };
+            let by = if lanes[l] { interim[k][l].wrapping_mul(step) } else { 0 };
             values[l] = values[l].wrapping_add(by);
         }
     }
