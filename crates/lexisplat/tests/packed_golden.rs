@@ -179,7 +179,7 @@ fn first_parts_of_a_golden_file_decode_bit_for_bit() {
     let reader = LexiReader::open(name, std::fs::read(golden(name, "lexi")).unwrap(), &Limits::default());
     let reader = reader.unwrap().with_integers_verified().unwrap();
     let outline = reader.outline().unwrap();
-    assert_eq!(outline.layers.iter().map(|layer| layer.levels).collect::<Vec<_>>(), [2, 1]);
+    assert_eq!(outline.layers.iter().map(|layer| layer.refinements).collect::<Vec<_>>(), [2, 1]);
     assert!(packed.head().atoms > 256 && outline.chunks.iter().any(|chunk| chunk.gaussians >= 2048));
     let whole = ply_bytes(&reader.model().unwrap().into_splats());
     let found = checksums_of_first_parts(&packed);

@@ -565,11 +565,11 @@ fn wrong_sums_of_integers_are_found_when_asked_for() {
 
 /// The number by which errors name a range of the last layer.
 fn number(kind: &RangeKind, file: &[u8]) -> usize {
-    let levels = outline(file).layers.last().unwrap().levels;
+    let refinements = outline(file).layers.last().unwrap().refinements;
     match kind {
         RangeKind::Base => 0,
         RangeKind::Refinement(level) => 1 + level,
-        RangeKind::Sh(part) => 1 + levels + part,
+        RangeKind::Sh(part) => 1 + refinements + part,
         other => panic!("{other:?} in the last layer"),
     }
 }

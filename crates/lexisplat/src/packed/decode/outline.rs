@@ -26,7 +26,7 @@ pub struct LayerOutline {
     /// Indices of its chunks in [`Outline::chunks`].
     pub chunks: Range<usize>,
     /// Number of refinements of each of its chunks.
-    pub levels: usize,
+    pub refinements: usize,
     /// Number of SH parts of each of its chunks.
     pub sh_parts: usize,
 }
@@ -117,7 +117,7 @@ impl Outline {
     /// Creates the outline of `index`. The data start at byte `data_start` of the file.
     pub(in crate::packed) fn new(index: &Index, data_start: u64) -> Self {
         let layer = |form: &LayerForm| LayerOutline {
-            levels: form.refinements,
+            refinements: form.refinements,
             sh_parts: form.sh_parts,
             ..LayerOutline::default()
         };
@@ -149,7 +149,7 @@ impl Outline {
     /// Returns the index of a range within its chunk, by which errors name it.
     pub(crate) fn number(&self, range: &RangeOutline) -> usize {
         let layer = self.chunks.get(range.chunk).and_then(|chunk| self.layers.get(chunk.layer));
-        let (refinements, sh_parts) = layer.map_or((0, 0), |layer| (layer.levels, layer.sh_parts));
+        let (refinements, sh_parts) = layer.map_or((0, 0), |layer| (layer.refinements, layer.sh_parts));
         match range.kind {
             RangeKind::Base => 0,
             RangeKind::Refinement(k) => 1 + k,

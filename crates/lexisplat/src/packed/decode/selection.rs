@@ -206,7 +206,7 @@ mod tests {
             outline.layers.push(LayerOutline {
                 gaussians: (count * gaussians) as u64,
                 chunks: chunks.clone(),
-                levels: 1,
+                refinements: 1,
                 sh_parts: 2,
             });
             for c in chunks {
