@@ -11,7 +11,7 @@ use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErr
 
 use crate::error::Result;
 use crate::only_cancels::OneStep;
-use crate::solve::{ROW, kinds, solve};
+use crate::solve::{KEPT_BYTES, ROW, kinds, solve};
 
 /// Number of solutions: for sizes, for opacities and for colours.
 const SOLUTIONS: usize = 3;
@@ -84,7 +84,7 @@ fn nearest<const N: usize>(
     targets: &[Image],
     progress: &dyn Progress,
 ) -> Result<Vec<GaussianChange<N>>> {
-    let mut adjoint = PictureAdjoint::new(Scene::from(splats), cameras)?;
+    let mut adjoint = PictureAdjoint::new(Scene::from(splats), cameras, KEPT_BYTES)?;
     let found = adjoint.of_errors(targets, progress)?;
     let PictureErrors { errors, row_sums, opacity_squares, size_squares, .. } = found;
     let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len().max(1) as f32;

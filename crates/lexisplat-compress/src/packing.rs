@@ -9,13 +9,14 @@ use lexisplat_render::{Camera, Renderer};
 
 use crate::error::{Error, Result};
 use crate::packing_views::Looked;
+use crate::solve::KEPT_BYTES;
 use crate::target::Target;
 use crate::views::Viewpoints;
 
 /// Estimate of the memory that packing a whole scene takes: `MEMORY` bytes, and `MEMORY_PER_TEN_BYTES` bytes for each ten
-/// bytes of the source. A PLY of 99 MB took 540 MB, one of 793 MB 2,320 MB, without the pages of the file itself
-/// (docs/results/sizes.md).
-const MEMORY: u64 = 320_000_000;
+/// bytes of the source. Without what refitting keeps, a PLY of 99 MB took 540 MB, one of 793 MB 2,320 MB, without the pages of
+/// the file itself (docs/results/sizes.md).
+const MEMORY: u64 = 320_000_000 + KEPT_BYTES;
 const MEMORY_PER_TEN_BYTES: u64 = 26;
 /// Default of the program and of the Python package for the memory that packing a whole scene may take, in bytes.
 pub const DEFAULT_MEMORY: u64 = 4 << 30;

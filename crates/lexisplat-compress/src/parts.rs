@@ -109,6 +109,7 @@ pub(crate) fn refit(
     progress: &dyn Progress,
 ) -> Result<Vec<Appearance>> {
     let progress = &OnlyCancels(progress);
-    let fit = Fit::to(part, views_of(memo)?.fitting_part(part), false, progress)?;
+    // Parts are for scenes that leave little memory, so nothing is kept.
+    let fit = Fit::to(part, views_of(memo)?.fitting_part(part), false, progress)?.keeping(0);
     fit.appearances(Scene::from(model), sensitivities, progress)
 }

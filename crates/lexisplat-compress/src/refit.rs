@@ -15,7 +15,7 @@ use crate::drawing::{DrawOptions, draw_views};
 use crate::error::Result;
 use crate::interim::interim_changes;
 use crate::only_cancels::OneStep;
-use crate::solve::{ROW, kinds, solve};
+use crate::solve::{KEPT_BYTES, ROW, kinds, solve};
 
 /// Number of conjugate-gradient steps with given cameras and with found views. Each step takes about as long as drawing all
 /// views. More steps gain less on other views than the fitted ones (docs/METHOD.md).
@@ -45,6 +45,8 @@ pub(crate) struct Fit {
     targets: Vec<Image>,
     /// Whether cameras were given.
     given: bool,
+    /// Largest number of bytes that are kept from one step to the next.
+    kept_bytes: u64,
 }
 
 impl<S: Borrow<Splats>> Refitting<S> {
@@ -171,7 +173,12 @@ impl Fit {
     ) -> Result<Self> {
         let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
         let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, progress)?;
-        Ok(Self { cameras, targets, given })
+        Ok(Self { cameras, targets, given, kept_bytes: KEPT_BYTES })
+    }
+
+    /// Returns this fit with another largest number of bytes that are kept from one step to the next. It changes no result.
+    pub(crate) fn keeping(self, kept_bytes: u64) -> Self {
+        Self { kept_bytes, ..self }
     }
 
     /// Returns the base colours and opacities of `scene` with which its pictures are nearest to the targets. `sensitivities`
@@ -185,7 +192,7 @@ impl Fit {
         sensitivities: &[AppearanceSensitivity],
         progress: &dyn Progress,
     ) -> Result<Vec<Appearance>> {
-        let mut adjoint = PictureAdjoint::new(scene, &self.cameras)?;
+        let mut adjoint = PictureAdjoint::new(scene, &self.cameras, self.kept_bytes)?;
         let steps = if self.given { STEPS_GIVEN } else { STEPS_FOUND };
         // The views are drawn once for the errors and once in each step.
         progress.begin(Stage::Draw, ((1 + steps) * self.cameras.len()) as u64);

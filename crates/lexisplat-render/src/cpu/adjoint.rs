@@ -16,9 +16,10 @@ use crate::scene::Scene;
 use super::blend::{BLOCKS, Canvas, SIDE, Tile};
 use super::lanes::{LANES, Lanes, each};
 use super::math::mask;
-use super::measured_tiles::{Pool, Scratch, measure_tiles};
+use super::measured_tiles::{KeptView, Pool, Scratch, measure_tiles};
 use super::project::Projection;
 use super::splat::Splat;
+use super::tiles::List;
 use super::trace::Trace;
 use super::workspace::Workspace;
 
@@ -56,18 +57,23 @@ pub struct PictureAdjoint<'a> {
     cameras: &'a [Camera],
     workspace: Workspace,
     pool: Pool,
+    /// The first views, as many as there is memory for.
+    kept: Vec<KeptView>,
+    /// Number of bytes that more kept views may have.
+    room: u64,
 }
 
 impl<'a> PictureAdjoint<'a> {
-    /// Returns the pictures of `scene` from `cameras`.
+    /// Returns the pictures of `scene` from `cameras`. Projected Gaussians of the first cameras are kept from one product to
+    /// the next, in at most `most_bytes` bytes. Results do not depend on this number.
     ///
     /// # Errors
     /// As [`crate::render`].
-    pub fn new(scene: Scene<'a>, cameras: &'a [Camera]) -> Result<Self> {
+    pub fn new(scene: Scene<'a>, cameras: &'a [Camera], most_bytes: u64) -> Result<Self> {
         scene.validate()?;
         cameras.iter().try_for_each(Camera::validate)?;
         let workspace = Workspace::of_scene(scene.geometry());
-        Ok(Self { scene, cameras, workspace, pool: Pool::default() })
+        Ok(Self { scene, cameras, workspace, pool: Pool::default(), kept: Vec::new(), room: most_bytes })
     }
 
     /// Returns the adjoint of J times the errors of the pictures. An error is `target - picture`, with both clamped to 0
@@ -148,12 +154,13 @@ impl<'a> PictureAdjoint<'a> {
             let [_, drawn] = projection.pixel_counts();
             #[expect(clippy::cast_precision_loss, reason = "a count of views, to single precision")]
             let share = 1.0 / (drawn * self.cameras.len() as f32);
-            self.workspace.project(&self.scene, &radiance, &projection);
-            measure_tiles(
-                &mut self.workspace,
-                &self.pool,
-                &projection,
-                |splats, list, tile, Scratch { canvas, trace }| {
+            let mut spare = None;
+            if view >= self.kept.len() {
+                self.workspace.project(&self.scene, &radiance, &projection);
+                spare = self.keep(view, &projection);
+            }
+            let measure =
+                |splats: &[Splat], list: List<'_>, tile, Scratch { canvas, trace }: &mut Scratch| {
                     trace.clear();
                     simd.dispatch(
                         #[inline(always)]
@@ -162,15 +169,33 @@ impl<'a> PictureAdjoint<'a> {
                             carry(canvas, trace, tile, &light(canvas, trace, view, tile))
                         },
                     )
-                },
-                |gaussian, values: [f32; N]| {
-                    sums[gaussian].iter_mut().zip(values).for_each(|(sum, value)| *sum += value * share);
-                },
-            );
+                };
+            let add = |gaussian: usize, values: [f32; N]| {
+                sums[gaussian].iter_mut().zip(values).for_each(|(sum, value)| *sum += value * share);
+            };
+            match self.kept.get(view).or(spare.as_ref()) {
+                Some(kept) => kept.measure(&self.pool, &projection, measure, add),
+                None => measure_tiles(&mut self.workspace, &self.pool, &projection, measure, add),
+            }
             progress.advance(1);
         }
         progress.end();
         Ok(sums)
+    }
+
+    /// Keeps view number `view`, which is projected, if all views before it are kept. Returns it if there is no room for it.
+    fn keep(&mut self, view: usize, projection: &Projection) -> Option<KeptView> {
+        if view != self.kept.len() || self.room == 0 {
+            return None;
+        }
+        let kept = KeptView::of(&mut self.workspace, projection)?;
+        let room = self.room.checked_sub(kept.bytes());
+        self.room = room.unwrap_or(0);
+        if room.is_none() {
+            return Some(kept);
+        }
+        self.kept.push(kept);
+        None
     }
 }
 
@@ -503,7 +528,7 @@ mod tests {
             pixels.map(|(a, b)| std::array::from_fn(|c| (a[c] - b[c]) / (2.0 * STEP))).collect()
         };
         let pictures = kinds.each_ref().map(|changes| moved(changes));
-        let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras).unwrap();
+        let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras, 0).unwrap();
         let pixels = f64::from(3 * 70 * 50);
         for (changes, picture) in kinds.iter().zip(&pictures) {
             let product = adjoint.of_changes(changes, &Silent).unwrap();
@@ -526,6 +551,32 @@ mod tests {
         assert!(adjoint.of_changes(&kinds[0][1..], &Silent).is_err());
     }
 
+    /// Results do not depend on how many views are kept.
+    #[test]
+    fn kept_views_change_nothing() {
+        let (splats, cameras) = sample();
+        let set = TileSet::new(70, 50, |column, row| (column + row) % 2 == 0);
+        let parts: Vec<Camera> =
+            cameras.iter().map(|camera| camera.clone().with_tiles(set.clone())).collect();
+        let changes = vec![[0.2, 0.1, -0.1, 0.3]; splats.len()];
+        for cameras in [&cameras, &parts] {
+            let targets = drawn(&with(&splats, &vec![[0.1; 5]; splats.len()], 0.5), cameras);
+            // No room, room for some views, and room for all.
+            let found = [0, 300_000, u64::MAX].map(|most_bytes| {
+                let mut adjoint = PictureAdjoint::new(Scene::from(&splats), cameras, most_bytes).unwrap();
+                let errors = adjoint.of_errors::<4>(&targets, &Silent).unwrap();
+                let products = [0, 1].map(|_| adjoint.of_changes(&changes, &Silent).unwrap());
+                (errors, products, adjoint.kept.len())
+            });
+            assert_eq!(found[0].2, 0);
+            assert!(0 < found[1].2 && found[1].2 < cameras.len(), "{}", found[1].2);
+            assert_eq!(found[2].2, cameras.len());
+            assert!(
+                found.iter().all(|(errors, products, _)| (errors, products) == (&found[0].0, &found[0].1))
+            );
+        }
+    }
+
     /// The adjoint of the errors of pictures is half the negative gradient of their squares.
     #[test]
     fn errors_are_carried_back() {
@@ -534,7 +585,7 @@ mod tests {
             .map(|i| [0.1, 0.05, -0.05, 0.1 * (i % 3) as f32, 0.02 * (i % 5) as f32])
             .collect();
         let targets = drawn(&with(&splats, &changes, 0.5), &cameras);
-        let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras).unwrap();
+        let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras, 0).unwrap();
         let PictureErrors { errors, row_sums, opacity_squares, size_squares } =
             adjoint.of_errors::<5>(&targets, &Silent).unwrap();
         let squares = |share: f32| -> f64 {
@@ -569,7 +620,7 @@ mod tests {
             let cameras: Vec<Camera> =
                 cameras.iter().map(|camera| camera.clone().with_tiles(set.clone())).collect();
             let targets = drawn(&with(&splats, &changes, 0.5), &cameras);
-            let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras).unwrap();
+            let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras, 0).unwrap();
             let found = adjoint.of_errors::<5>(&targets, &Silent).unwrap();
             (set.pixels() as f32 / (70.0 * 50.0), found.errors)
         });

@@ -7,7 +7,7 @@ use crate::parallel::*;
 use super::blend::{Canvas, Tile};
 use super::project::Projection;
 use super::splat::Splat;
-use super::tiles::{self, List};
+use super::tiles::{self, List, TileLists};
 use super::trace::Trace;
 use super::workspace::Workspace;
 
@@ -53,26 +53,79 @@ pub(super) fn measure_tiles<T: Send>(
     order.sort(visible);
     for band in tiles::bands(order, grid, tiles::MAX_ENTRIES) {
         lists.fill(order, grid, projection.chosen.as_ref(), &band);
-        let tiles = projection.tiles(&band);
-        let mut first = 0;
-        while first < tiles.len() {
-            let mut entries = lists.len(tiles[first].0);
-            let mut end = first + 1;
-            while end < tiles.len() && entries + lists.len(tiles[end].0) <= ENTRIES {
-                entries += lists.len(tiles[end].0);
-                end += 1;
-            }
-            let measured: Vec<Vec<(u32, T)>> = (first..end)
-                .into_par_iter()
-                .map(|k| {
-                    let (tile, place) = tiles[k];
-                    pool.with(|scratch| measure(&visible.slots, lists.of(tile), place, scratch))
-                })
-                .collect();
-            for (gaussian, value) in measured.into_iter().flatten() {
-                add(gaussian as usize, value);
-            }
-            first = end;
+        measure_band(&visible.slots, lists, &projection.tiles(&band), pool, &measure, &mut add);
+    }
+}
+
+/// Measures the `tiles` of a band, whose lists have slots of `splats`.
+fn measure_band<T: Send>(
+    splats: &[Splat],
+    lists: &TileLists,
+    tiles: &[(usize, Tile)],
+    pool: &Pool,
+    measure: &(impl Fn(&[Splat], List<'_>, Tile, &mut Scratch) -> Vec<(u32, T)> + Sync),
+    add: &mut impl FnMut(usize, T),
+) {
+    let mut first = 0;
+    while first < tiles.len() {
+        let mut entries = lists.len(tiles[first].0);
+        let mut end = first + 1;
+        while end < tiles.len() && entries + lists.len(tiles[end].0) <= ENTRIES {
+            entries += lists.len(tiles[end].0);
+            end += 1;
         }
+        let measured: Vec<Vec<(u32, T)>> = (first..end)
+            .into_par_iter()
+            .map(|k| {
+                let (tile, place) = tiles[k];
+                pool.with(|scratch| measure(splats, lists.of(tile), place, scratch))
+            })
+            .collect();
+        for (gaussian, value) in measured.into_iter().flatten() {
+            add(gaussian as usize, value);
+        }
+        first = end;
+    }
+}
+
+/// The splats and lists of a view that is measured several times.
+#[derive(Debug)]
+pub(super) struct KeptView {
+    /// The splats that the lists have, in the order of depth.
+    splats: Vec<Splat>,
+    lists: TileLists,
+}
+
+impl KeptView {
+    /// Returns the view whose projected Gaussians `workspace` has; `None` if its lists are too long to be kept.
+    pub(super) fn of(workspace: &mut Workspace, projection: &Projection) -> Option<Self> {
+        let Workspace { visible, order, .. } = workspace;
+        order.sort(visible);
+        let [band] = tiles::bands(order, projection.grid, tiles::MAX_ENTRIES).try_into().ok()?;
+        let splats = order.keys.iter().map(|&(_, slot)| visible.slots[slot as usize]).collect();
+        // Splats are numbered by their places in `splats` from here on.
+        for (number, (_, slot)) in (0..).zip(&mut order.keys) {
+            *slot = number;
+        }
+        let mut lists = TileLists::default();
+        lists.fill(order, projection.grid, projection.chosen.as_ref(), &band);
+        Some(Self { splats, lists })
+    }
+
+    /// Returns the number of bytes in memory.
+    pub(super) fn bytes(&self) -> u64 {
+        size_of_val(self.splats.as_slice()) as u64 + self.lists.bytes()
+    }
+
+    /// Measures every tile, as [`measure_tiles`].
+    pub(super) fn measure<T: Send>(
+        &self,
+        pool: &Pool,
+        projection: &Projection,
+        measure: impl Fn(&[Splat], List<'_>, Tile, &mut Scratch) -> Vec<(u32, T)> + Sync,
+        mut add: impl FnMut(usize, T),
+    ) {
+        let tiles = projection.tiles(&(0..projection.grid.rows));
+        measure_band(&self.splats, &self.lists, &tiles, pool, &measure, &mut add);
     }
 }

@@ -83,6 +83,12 @@ impl TileLists {
         });
     }
 
+    /// Returns the number of bytes in memory.
+    pub(super) fn bytes(&self) -> u64 {
+        let bytes = |p: &Piece| size_of_val(p.starts.as_slice()) + size_of_val(p.entries.as_slice());
+        self.pieces.iter().map(bytes).sum::<usize>() as u64
+    }
+
     /// Returns the number of splats in the list of tile `tile` of the band.
     pub(super) fn len(&self, tile: usize) -> usize {
         self.pieces.iter().map(|p| p.starts[tile + 1] - p.starts[tile]).sum()
