@@ -561,19 +561,18 @@ mod tests {
         let changes = vec![[0.2, 0.1, -0.1, 0.3]; splats.len()];
         for cameras in [&cameras, &parts] {
             let targets = drawn(&with(&splats, &vec![[0.1; 5]; splats.len()], 0.5), cameras);
-            // No room, room for some views, and room for all.
-            let found = [0, 300_000, u64::MAX].map(|most_bytes| {
+            let found = |most_bytes| {
                 let mut adjoint = PictureAdjoint::new(Scene::from(&splats), cameras, most_bytes).unwrap();
                 let errors = adjoint.of_errors::<4>(&targets, &Silent).unwrap();
                 let products = [0, 1].map(|_| adjoint.of_changes(&changes, &Silent).unwrap());
-                (errors, products, adjoint.kept.len())
-            });
-            assert_eq!(found[0].2, 0);
-            assert!(0 < found[1].2 && found[1].2 < cameras.len(), "{}", found[1].2);
-            assert_eq!(found[2].2, cameras.len());
-            assert!(
-                found.iter().all(|(errors, products, _)| (errors, products) == (&found[0].0, &found[0].1))
-            );
+                ((errors, products), adjoint.kept.len(), most_bytes - adjoint.room)
+            };
+            let (all, kept, bytes) = found(u64::MAX);
+            assert_eq!(kept, cameras.len());
+            let (some, kept, _) = found(2 * bytes / 3);
+            assert!(0 < kept && kept < cameras.len(), "{kept}");
+            let (none, kept, _) = found(0);
+            assert!(kept == 0 && all == some && all == none);
         }
     }
 
