@@ -15,9 +15,6 @@ import { Stages } from './stages.js';
 
 /** The name under which a call of Babylon's loader has options for this one. */
 const NAME = 'lexi';
-// What Babylon's loader of SPZ files sets for scenes that were trained with the anti-aliased dilation, pixels squared
-// (@babylonjs/loaders 9.28.0, SPLAT/splatFileLoader).
-const ANTIALIASED_KERNEL = 0.1;
 
 /** Loads .lexi files as a GaussianSplattingMesh. */
 export class LexiFileLoader {
@@ -111,7 +108,8 @@ function meshOf(scene, container, { antialiased }) {
   const mesh = new GaussianSplattingMesh('GaussianSplatting', null, scene);
   mesh._parentContainer = container;
   mesh.scaling.y = -1;
-  if (antialiased) Object.assign(mesh.material, { kernelSize: ANTIALIASED_KERNEL, compensation: true });
+  // Babylon widens Gaussians by 0.3 pixels squared, as the trainer does; with the anti-aliased dilation they keep their light.
+  if (antialiased) mesh.material.compensation = true;
   return mesh;
 }
 
