@@ -1,10 +1,12 @@
 // Babylon.js from npm, in Chromium, draws a .lexi by our plugin as it draws the same scene as a PLY by its own.
 
 import assert from 'node:assert/strict';
-import { mkdtempSync, rmSync, statSync, writeFileSync } from 'node:fs';
+import { spawnSync } from 'node:child_process';
+import { mkdirSync, mkdtempSync, rmSync, statSync, symlinkSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
 import { launch, npm, psnr, shot } from './support/chromium.mjs';
 import { plyOf } from './support/ply.mjs';
 import { dense, golden, lit, openViewer, serveViewers } from './support/viewers.mjs';
@@ -16,6 +18,19 @@ const ALIKE = 45;
 const SIZE = 256;
 // Babylon draws SH up to this degree.
 const MOST_DEGREE = 4;
+const TYPED = `import { ImportMeshAsync, RegisterSceneLoaderPlugin } from '@babylonjs/core/Loading/sceneLoader.js';
+import { Scene } from '@babylonjs/core/scene.js';
+import { LexiFileLoader, registerLexi } from 'lexisplat/babylon';
+declare const scene: Scene;
+registerLexi({ workers: 1 });
+RegisterSceneLoaderPlugin(new LexiFileLoader());
+const lexi = { shParts: 1, onRefine: (mesh: { shDegree: number }, there: { gaussians: number }) => console.log(mesh.shDegree, there.gaussians) };
+console.log((await ImportMeshAsync('scene.lexi', scene, { pluginOptions: { lexi } })).meshes[0].name);
+// @ts-expect-error parts are a number
+registerLexi({ shParts: 'all' });
+// @ts-expect-error parts are a number
+await ImportMeshAsync('scene.lexi', scene, { pluginOptions: { lexi: { shParts: 'all' } } });
+`;
 const folder = mkdtempSync(join(tmpdir(), 'lexisplat-babylon-'));
 const skip = npm ? false : 'LEXISPLAT_NPM names no folder with @babylonjs/core, @babylonjs/loaders and playwright-core';
 let browser;
@@ -174,6 +189,19 @@ test('a scene trained with the anti-aliased dilation is drawn so', { skip }, asy
     await viewer.call('show', { url: `/golden/${name}.lexi` });
     assert.equal(await viewer.call('compensation'), (await dense(name)).header.antialiased, name);
   }
+});
+
+test('calls of Babylon have types', { skip }, () => {
+  const modules = join(folder, 'types/node_modules');
+  mkdirSync(modules, { recursive: true });
+  symlinkSync(join(npm, '@babylonjs'), join(modules, '@babylonjs'));
+  symlinkSync(fileURLToPath(new URL('..', import.meta.url)), join(modules, 'lexisplat'));
+  writeFileSync(join(folder, 'types/call.mts'), TYPED);
+  const options = { strict: true, noEmit: true, target: 'es2022', module: 'nodenext', lib: ['es2022', 'dom', 'esnext.asynciterable'], types: [] };
+  const compilerOptions = { ...options, skipLibCheck: true, preserveSymlinks: true };
+  writeFileSync(join(folder, 'types/tsconfig.json'), JSON.stringify({ compilerOptions, include: ['*.mts'] }));
+  const { status, stdout } = spawnSync(process.execPath, [join(npm, 'typescript/bin/tsc'), '-p', join(folder, 'types')], { encoding: 'utf8' });
+  assert.equal(status, 0, stdout);
 });
 
 test('the example draws', { skip }, async () => {
