@@ -31,6 +31,9 @@ registerLexi({ shParts: 'all' });
 // @ts-expect-error parts are a number
 await ImportMeshAsync('scene.lexi', scene, { pluginOptions: { lexi: { shParts: 'all' } } });
 `;
+// Bytes with which the first layer of packed3_layers is there, and how like the whole it is at least, dB.
+const HELD = 12_000;
+const COARSE = 15;
 const folder = mkdtempSync(join(tmpdir(), 'lexisplat-babylon-'));
 const skip = npm ? false : 'LEXISPLAT_NPM names no folder with @babylonjs/core, @babylonjs/loaders and playwright-core';
 let browser;
@@ -111,6 +114,23 @@ for (const name of ['degree0', 'degree1_u16_escapes', 'paper', 'f16', 'degree4',
     scales(ours).forEach((scale, k) => assert.ok(Math.abs(scale / expected[k] - 1) < 1e-6, `scale ${k}`));
   });
 }
+
+test('the first layer is drawn while the rest comes', { skip }, async () => {
+  const viewer = await shown();
+  const url = '/golden/packed3_layers.lexi';
+  const { chunk } = await dense('packed3_layers');
+  const [view] = orbit(chunk.positions, 1, SIZE);
+  await viewer.call('show', { url });
+  const whole = await viewer.picture(view);
+  await viewer.call('begin', { url, bytes: HELD });
+  const coarse = await viewer.picture(view);
+  const alike = psnr(coarse, whole);
+  assert.ok(alike > COARSE && alike < ALIKE, `after the first layer: ${alike} dB`);
+  await viewer.call('end');
+  const last = psnr(await viewer.picture(view), whole);
+  assert.ok(last >= ALIKE, `in the end: ${last} dB`);
+  assert.deepEqual(viewer.faults, []);
+});
 
 test('a mesh shows more and more while its file loads, and in the end what it shows at once', { skip }, async () => {
   const viewer = await shown();

@@ -16,6 +16,9 @@ const ALIKE = 45;
 const SIZE = 256;
 // Logarithms, angles and roots of two programs differ by this many steps of what is packed.
 const STEP = 1;
+// Bytes with which the first layer of packed3_layers is there, and how like the whole it is at least, dB.
+const HELD = 12_000;
+const COARSE = 15;
 const folder = mkdtempSync(join(tmpdir(), 'lexisplat-spark-'));
 const skip = npm ? false : 'LEXISPLAT_NPM names no folder with @sparkjsdev/spark, three and playwright-core';
 let browser;
@@ -121,6 +124,24 @@ for (const name of ['degree0', 'degree1_u16_escapes', 'paper', 'f16', 'degree4',
       const expected = numbersOf(theirs, i);
       numbersOf(ours, i).forEach((number, k) => assert.ok(Math.abs(number - expected[k]) <= STEP, `Gaussian ${i}, number ${k}: ${number}, not ${expected[k]}`));
     }
+  });
+}
+
+for (const as of ['dense', 'codes']) {
+  test(`${as}: the first layer is drawn while the rest comes`, { skip }, async () => {
+    const url = '/golden/packed3_layers.lexi';
+    const { chunk } = await dense('packed3_layers');
+    const [view] = orbit(chunk.positions, 1, SIZE);
+    await viewer.call('show', { url, as });
+    const whole = await viewer.picture(view);
+    await viewer.call('begin', { url, bytes: HELD, as });
+    const coarse = await viewer.picture(view);
+    const alike = psnr(coarse, whole);
+    assert.ok(alike > COARSE && alike < ALIKE, `after the first layer: ${alike} dB`);
+    await viewer.call('end');
+    const last = psnr(await viewer.picture(view), whole);
+    assert.ok(last >= ALIKE, `in the end: ${last} dB`);
+    assert.deepEqual(viewer.faults, []);
   });
 }
 
