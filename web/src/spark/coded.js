@@ -124,6 +124,9 @@ const BASIS = `
 
 // The colour that SH add to a Gaussian's base colour; `drawn` coefficients of a channel are summed of those that `held` are.
 function shaderOf(drawn, held) {
+  // Written out, since a basis that is read by a number that the compiler knows stays in registers.
+  const term = (_, i) => `basis[${i}] * texelFetch(atoms, row + ivec2(${i}, 0), 0).xyz`;
+  const terms = Array.from({ length: drawn }, term).join(' + ');
   const texel = (at) => `ivec2(${at} & ${WIDTH - 1}u, ${at} >> ${WIDTH_BITS}u)`;
   return `
 vec3 lexiColour${drawn}(int index, vec3 v, usampler2D codes, usampler2D nonzeros, sampler2D atoms) {${BASIS}
@@ -143,8 +146,7 @@ vec3 lexiColour${drawn}(int index, vec3 v, usampler2D codes, usampler2D nonzeros
     uint nonzero = texelFetch(nonzeros, ${texel('n')}, 0).x;
     int atom = int(nonzero & 0xffffu);
     ivec2 row = ivec2((atom % ${ATOMS_PER_ROW}) * ${held}, atom / ${ATOMS_PER_ROW});
-    vec3 shown = vec3(0.0);
-    for (int i = 0; i < ${drawn}; i++) shown += basis[i] * texelFetch(atoms, row + ivec2(i, 0), 0).xyz;
+    vec3 shown = ${terms};
     sum += unpackHalf2x16(nonzero).y * shown;
   }
   return sum;
