@@ -21,7 +21,9 @@ export const PACKED = '3';
  */
 export async function openWith(env, source, options) {
   const input = { source: env.source(source) ?? sourceOf(source), feed: undefined };
-  const settings = watched(input.source, { memory: MEMORY, shParts: ALL_PARTS, ...options });
+  // An option that is undefined is one that is not given.
+  const given = Object.entries(options ?? {}).filter(([, value]) => value !== undefined);
+  const settings = watched(input.source, { memory: MEMORY, shParts: ALL_PARTS, ...Object.fromEntries(given) });
   const { signal } = settings;
   signal?.throwIfAborted();
   const workers = settings.workers ?? (env.hasWorkers ? WORKERS : 0);

@@ -7,11 +7,8 @@
 
 import { Loader } from 'three';
 import { open } from './index.js';
+import { progressEvent } from './progress.js';
 import { Assembly } from './three/assembly.js';
-
-// A picture in between is made when this many times more Gaussians are there than in the one before: all of them
-// together then copy fewer Gaussians than the scene has twice.
-const GROWTH = 2;
 
 /** Loads .lexi files as geometries of Gaussian splats. */
 export class LexiLoader extends Loader {
@@ -47,8 +44,7 @@ export class LexiLoader extends Loader {
    */
   load(url, onLoad, onProgress, onError) {
     const address = this.manager.resolveURL(this.path + url);
-    const report = ({ loaded, total }) =>
-      onProgress?.(new ProgressEvent('progress', { lengthComputable: total !== undefined, loaded, total: total ?? 0 }));
+    const report = (progress) => onProgress?.(progressEvent(progress));
     this.manager.itemStart(url);
     this.#geometry(address, report)
       .then(onLoad)
@@ -82,14 +78,10 @@ export class LexiLoader extends Loader {
     const scene = await open(source, { ...this.#options, signal, onProgress });
     try {
       const assembly = new Assembly(scene.header);
-      let shown = 0;
+      const { stages } = assembly;
       for await (const chunk of scene.chunks({ as: 'dense', refine: this.#refine !== undefined })) {
         assembly.write(chunk);
-        const { gaussians, count } = assembly;
-        const grown = gaussians >= GROWTH * shown || gaussians === count;
-        if (!this.#refine || !grown || gaussians === shown || assembly.complete) continue;
-        shown = gaussians;
-        this.#refine(assembly.geometry(), { gaussians, of: count });
+        if (this.#refine && stages.take()) this.#refine(assembly.geometry(), { gaussians: stages.gaussians, of: stages.count });
       }
       return assembly.geometry();
     } finally {

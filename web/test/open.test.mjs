@@ -372,6 +372,12 @@ test('damage is an error, and never a fault', async () => {
   }
 });
 
+test('an option that is undefined is not given', async () => {
+  const scene = await open(layered, { workers: undefined, memory: undefined, shParts: undefined, signal: undefined });
+  assert.ok((await scene.all({ as: 'dense' })).sh.some((value) => value !== 0));
+  scene.close();
+});
+
 test('a signal stops it', async () => {
   await assert.rejects(open(layered, { signal: AbortSignal.abort() }), { name: 'AbortError' });
   const stop = new AbortController();

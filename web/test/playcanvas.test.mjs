@@ -49,10 +49,10 @@ for (const [backend, count] of [['webgl2', 2], ['webgpu', 1]]) {
     const viewer = await shown(backend);
     assert.equal(await viewer.call('backend'), backend);
     const views = orbit(chunk.positions, count, SIZE);
-    await viewer.call('show', '/ply/packed3_layers.ply');
+    await viewer.call('show', { url: '/ply/packed3_layers.ply' });
     const theirs = [];
     for (const view of views) theirs.push(await viewer.picture(view));
-    await viewer.call('show', '/golden/packed3_layers.lexi');
+    await viewer.call('show', { url: '/golden/packed3_layers.lexi' });
     assert.equal(await viewer.call('gaussians'), chunk.count);
     for (const [i, view] of views.entries()) {
       const ours = await viewer.picture(view);
@@ -113,7 +113,7 @@ test('on the GPU are a code word and geometry a Gaussian, a word a nonzero, and 
   const scene = await open(readFileSync(join(golden, 'packed3_layers.lexi')), { workers: 0 });
   const { count, codes } = await scene.all({ as: 'codes' });
   scene.close();
-  await viewer.call('show', '/golden/packed3_layers.lexi');
+  await viewer.call('show', { url: '/golden/packed3_layers.lexi' });
   const geometry = 4 * 4 + 4 * 2 + 4 * 2;
   const atom = ((scene.header.degree + 1) ** 2 - 1) * 4 * 2;
   const needed = (geometry + 4) * count + 4 * codes.indices.length + atom * scene.header.atoms;
@@ -132,7 +132,7 @@ test('codes in textures stand for the SH of every layout, escapes included', { s
     assert.equal(held.bands, bands);
     assertSame(held, chunk.sh, chunk.count, name);
   }
-  await viewer.call('show', '/golden/degree0.lexi');
+  await viewer.call('show', { url: '/golden/degree0.lexi' });
   assert.equal((await viewer.call('held')).bands, 0);
   assert.deepEqual(viewer.faults, []);
 });
@@ -157,10 +157,10 @@ test('a code of too many nonzeros is made dense', { skip }, async () => {
 test('what is no .lexi is told, and an asset that is unloaded stays so', { skip }, async () => {
   writeFileSync(join(folder, 'wrong.lexi'), 'ply\nformat ascii 1.0\nend_header\n');
   const viewer = await shown();
-  await assert.rejects(viewer.call('show', '/ply/wrong.lexi'), /not a .lexi/);
-  await assert.rejects(viewer.call('show', '/golden/none.lexi'), /404/);
+  await assert.rejects(viewer.call('show', { url: '/ply/wrong.lexi' }), /not a .lexi/);
+  await assert.rejects(viewer.call('show', { url: '/golden/none.lexi' }), /404/);
   assert.equal(await viewer.call('unloaded', '/golden/packed3_layers.lexi'), null);
-  await viewer.call('show', '/golden/packed3_layers.lexi');
+  await viewer.call('show', { url: '/golden/packed3_layers.lexi' });
   assert.equal(await viewer.call('gaussians'), 2600);
 });
 

@@ -50,10 +50,10 @@ for (const backend of ['WebGPU', 'WebGL2']) {
     const viewer = await shown(backend);
     assert.equal(await viewer.call('backend'), backend);
     const views = orbit(chunk.positions, 2, SIZE);
-    await viewer.call('show', '/ply/packed3_layers.ply');
+    await viewer.call('show', { url: '/ply/packed3_layers.ply' });
     const theirs = [];
     for (const view of views) theirs.push(await viewer.picture(view));
-    await viewer.call('show', '/golden/packed3_layers.lexi');
+    await viewer.call('show', { url: '/golden/packed3_layers.lexi' });
     assert.equal(await viewer.call('gaussians'), chunk.count);
     for (const [i, view] of views.entries()) {
       const ours = await viewer.picture(view);

@@ -12,7 +12,7 @@ import {
   TextureUtils,
   Vec2,
 } from 'playcanvas';
-import { atomTexels, codeWords } from './codes.js';
+import { atomTexels, codeWords } from '../codewords.js';
 import { GLSL, WGSL } from './shaders.js';
 
 const half = FloatPacking.float2Half;

@@ -5,14 +5,7 @@
 // and readSHData (gsplatCopyToWorkbuffer of its shader library). SH_COEFFS is how many coefficients a channel has. Under
 // GSPLAT_WORKBUFFER_GEOMETRY only colours are wanted, and PlayCanvas has the geometry from the last time.
 
-/** Bits of a code word that say where the nonzeros begin; those above say how many there are. */
-export const OFFSET_BITS = 26;
-/** The count of nonzeros that stands for an escape: SH as they are, in place of nonzeros. */
-export const ESCAPE = 63;
-/** Words of an escape for each coefficient: halves of red and green, half of blue. */
-export const ESCAPE_WORDS = 2;
-/** Atoms beside each other in a row of the dictionary's texture. */
-export const ATOMS_PER_ROW = 64;
+import { ATOMS_PER_ROW, ESCAPE, ESCAPE_WORDS, OFFSET_BITS } from '../codewords.js';
 
 const OFFSET_MASK = 2 ** OFFSET_BITS - 1;
 

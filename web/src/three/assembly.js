@@ -9,6 +9,7 @@ import {
   writeColorBytesFromSH0,
   writeCovariance,
 } from 'three/addons/utils/GaussianSplatUtils.js';
+import { Stages } from '../stages.js';
 
 // three.js draws no SH of a higher degree.
 const MOST_DEGREE = 3;
@@ -24,22 +25,14 @@ export class Assembly {
   /** @param {import('../index.js').Header} header of the scene */
   constructor(header) {
     const count = header.gaussians;
-    this.count = count;
     this.degree = Math.min(header.degree, MOST_DEGREE);
     this.rest = 3 * ((header.degree + 1) ** 2 - 1);
     this.centers = new Float32Array(3 * count);
     this.covariances = new Float32Array(6 * count);
     this.colors = new Uint8ClampedArray(4 * count);
     this.bands = Array.from({ length: this.degree }, (_, band) => createPackedSphericalHarmonicsBand(count, band + 1));
-    /** Gaussians that are there: by a chunk's index, where it begins, how many it has, whether no finer one comes. */
-    this.present = new Map();
-    /** How many Gaussians are there. */
-    this.gaussians = 0;
-  }
-
-  /** Whether all Gaussians are there as fine as they come. */
-  get complete() {
-    return this.gaussians === this.count && [...this.present.values()].every(({ complete }) => complete);
+    /** What is there. */
+    this.stages = new Stages(count);
   }
 
   /** @param {import('../index.js').Chunk} chunk as 'dense' */
@@ -54,8 +47,7 @@ export class Assembly {
       writeColorBytesFromSH0(this.colors, 4 * at, dc[s], dc[s + 1], dc[s + 2], sigmoid(opacities[i]));
     }
     for (let band = 1; band <= this.degree; band++) this.#writeBand(band, chunk);
-    if (!this.present.has(chunk.index)) this.gaussians += count;
-    this.present.set(chunk.index, { first, count, complete: chunk.complete });
+    this.stages.note(chunk);
   }
 
   // Theirs is coefficient by coefficient with its three channels beside each other, ours channel by channel.
@@ -74,23 +66,17 @@ export class Assembly {
   }
 
   /**
-   * A geometry of the Gaussians that are there. Once all are, it has the arrays themselves; before, copies.
+   * A geometry of the Gaussians that are there. Once all are as fine as they come, it has the arrays themselves; before, copies.
    * @returns {import('three').BufferGeometry}
    */
   geometry() {
-    const of = (array, size) => (this.complete ? array : this.#gathered(array, size));
+    const { complete } = this.stages;
+    const of = (array, size) => {
+      const gathered = this.stages.gathered(array, size);
+      return gathered === array && !complete ? array.slice() : gathered;
+    };
     const harmonics = {};
     this.bands.forEach(({ packed }, i) => (harmonics[`sh${i + 1}`] = of(packed, SH_BAND_WORDS[i + 1])));
     return createGaussianSplatGeometry(of(this.centers, 3), of(this.covariances, 6), of(this.colors, 4), harmonics);
-  }
-
-  #gathered(array, size) {
-    const out = new array.constructor(size * this.gaussians);
-    let at = 0;
-    for (const { first, count } of this.present.values()) {
-      out.set(array.subarray(size * first, size * (first + count)), at);
-      at += size * count;
-    }
-    return out;
   }
 }

@@ -1,16 +1,18 @@
 // A chunk of a scene as a PLY in INRIA's layout, for viewers that cannot read ours.
 
+// Most viewers draw SH up to this degree.
 const MOST_DEGREE = 3;
 
 /**
- * @param {number} degree of the chunk's SH; of a higher one than 3, what viewers draw is kept
+ * @param {number} degree of the chunk's SH; of a higher one than `most`, what viewers draw is kept
  * @param {import('../../src/index.js').Chunk} chunk as 'dense'
+ * @param {number} [most] degree that is written
  * @returns {Buffer}
  */
-export function plyOf(degree, chunk) {
+export function plyOf(degree, chunk, most = MOST_DEGREE) {
   const { count, positions, dc, sh, opacities, scales, rotations } = chunk;
   const held = (degree + 1) ** 2 - 1;
-  const kept = (Math.min(degree, MOST_DEGREE) + 1) ** 2 - 1;
+  const kept = (Math.min(degree, most) + 1) ** 2 - 1;
   const columns = [];
   const add = (names, at) => names.forEach((name, k) => columns.push({ name, value: (i) => at(i, k) }));
   add(['x', 'y', 'z'], (i, k) => positions[3 * i + k]);

@@ -1,17 +1,22 @@
-// Codes and dictionary as the texels that shaders.js reads.
+// Codes and dictionary as texels that shaders read: a Gaussian's SH are its few nonzeros times rows of the dictionary.
 
-import { FloatPacking } from 'playcanvas';
-import { ATOMS_PER_ROW, ESCAPE, ESCAPE_WORDS, OFFSET_BITS } from './shaders.js';
+import { half } from './half.js';
 
-// The largest half float. Infinity times 0 would be no number, and colours are cut off far before.
-const MOST = 65504;
-const half = (value) => FloatPacking.float2Half(Math.max(-MOST, Math.min(MOST, value)));
+/** Bits of a code word that say where the nonzeros begin; those above say how many there are. */
+export const OFFSET_BITS = 26;
+/** The count of nonzeros that stands for an escape: SH as they are, in place of nonzeros. */
+export const ESCAPE = 63;
+/** Words of an escape for each coefficient: halves of red and green, half of blue. */
+export const ESCAPE_WORDS = 2;
+/** Atoms beside each other in a row of the dictionary's texture. */
+export const ATOMS_PER_ROW = 64;
+
 const CHANNELS = 3;
 // Channels of a texel of the dictionary; textures of three channels are padded by drivers.
 const TEXEL = 4;
 
 /**
- * @param {import('../index.js').Scene['dictionary']} dictionary
+ * @param {import('./index.js').Scene['dictionary']} dictionary
  * @param {number} kept coefficients of a channel that are drawn
  * @returns {{width: number, height: number, texels: Uint16Array}} half floats; atom a begins at texel
  *     (a % ATOMS_PER_ROW) * kept of row a / ATOMS_PER_ROW, and texel i of it has coefficient i of red, green and blue
@@ -30,15 +35,15 @@ export function atomTexels({ atoms, rest, values }, kept) {
 }
 
 /**
- * @param {import('../index.js').Chunk} chunk as 'codes'
- * @param {import('../index.js').Scene['dictionary']} dictionary
+ * @param {import('./index.js').Chunk} chunk as 'codes'
+ * @param {import('./index.js').Scene['dictionary']} dictionary
  * @param {number} kept coefficients of a channel that are drawn
- * @param {Uint32Array} order the Gaussian of each word
+ * @param {Uint32Array} order the Gaussian of each word; without it, that of its number
  * @returns {{words: Uint32Array, nonzeros: Uint32Array}} a word a Gaussian: where its nonzeros begin, and from OFFSET_BITS
  *     on how many; nonzeros: the atom, and from bit 16 on the value as a half float
  * @throws {RangeError} if nonzeros are more than a word can say
  */
-export function codeWords({ count, codes }, dictionary, kept, order) {
+export function codeWords({ count, codes }, dictionary, kept, order = Uint32Array.from({ length: count }, (_, i) => i)) {
   const { counts, indices, values, escapes } = codes;
   const halves = values instanceof Uint16Array;
   const rest = dictionary.rest;
@@ -50,7 +55,7 @@ export function codeWords({ count, codes }, dictionary, kept, order) {
     if (counts[i] >= ESCAPE && !escaped.has(i)) escaped.set(i, row(dictionary, indices, values, at, counts[i], halves));
   }
   const nonzeros = new Uint32Array(indices.length + ESCAPE_WORDS * kept * escaped.size);
-  if (nonzeros.length > 2 ** OFFSET_BITS) throw new RangeError(`${nonzeros.length} nonzeros are more than PlayCanvas can be given`);
+  if (nonzeros.length > 2 ** OFFSET_BITS) throw new RangeError(`${nonzeros.length} nonzeros are more than a code word can name`);
 
   const words = new Uint32Array(count);
   let to = 0;

@@ -1,0 +1,5 @@
+/** lexisplat/babylon in Node. */
+
+import './index.js';
+
+export * from '../babylon.js';

@@ -1,0 +1,5 @@
+/** lexisplat/spark in Node. */
+
+import './index.js';
+
+export * from '../spark.js';
