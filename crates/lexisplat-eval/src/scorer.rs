@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn identical_pictures_need_no_network() {
-        // Too small for the network, so computing would fail.
+        // The picture is too small for the network.
         let a = picture(12, 12, 1);
         let scorer = Scorer::new().with_flip().with_lpips(random(Network::Alex, 1));
         let found = scorer.score("same", &a, &a).unwrap();

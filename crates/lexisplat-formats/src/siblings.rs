@@ -36,10 +36,10 @@ enum From<'a> {
 }
 
 impl<'a> Siblings<'a> {
-    /// No other files: a scene that names other files is refused.
+    /// No files. A scene that names other files is refused.
     pub const NONE: Siblings<'static> = Siblings(From::Nowhere);
 
-    /// The files in the folder of the file `path`.
+    /// Returns the files in the folder of the file `path`.
     #[must_use]
     pub fn of(path: &'a Path) -> Self {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
