@@ -14,7 +14,8 @@ const MIN_BUFFER: u64 = 256;
 const UPLOAD_PIECE: usize = 32 << 20;
 
 /// A buffer of wgpu whose memory is freed when this value is dropped and submitted work is done. A browser frees the memory of
-/// a plain [`wgpu::Buffer`] only when it collects garbage, which it does not know to be large.
+/// a plain [`wgpu::Buffer`] only when it collects garbage, which it does not know to be large. Commands that use the buffer must
+/// be submitted before it is dropped.
 #[derive(Debug)]
 pub struct OwnedBuffer(wgpu::Buffer);
 

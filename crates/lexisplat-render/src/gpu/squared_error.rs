@@ -69,9 +69,10 @@ impl GpuRenderer {
                 uniforms.push(uniform);
             }
             encoder.copy_buffer_to_buffer(&sums.raw, 0, &back.raw, 0, bytes);
-            Ok((back, encoder.finish(), uniforms))
+            Ok((encoder.finish(), back, (sums, uniforms)))
         };
-        let (back, commands, _uniforms) = gpu.checked("squared errors", make).await?;
+        // Buffers that commands use must live until these are submitted.
+        let (commands, back, _used) = gpu.checked("squared errors", make).await?;
         gpu.queue().submit([commands]);
         let sums: Vec<f32> = gpu.read(&back, bytes).await?;
         Ok(sums.into_iter().map(f64::from).sum())
