@@ -78,9 +78,9 @@ export class Pool {
     return this.#workers.length;
   }
 
-  /** How many workers have nothing to do. */
-  get idle() {
-    return this.#workers.filter((worker) => worker.busy === 0).length;
+  /** How many workers have no message that waits. One waits for each, so that workers need not wait for the page. */
+  get free() {
+    return this.#workers.filter((worker) => worker.busy < 2).length;
   }
 
   /** Asks the worker that has least to do. `onPart` takes what it sends before its answer. */

@@ -106,7 +106,7 @@ export async function* streamed({ source, feed, pool, options, as, refine, stats
     for (;;) {
       if (signal?.aborted) throw signal.reason;
       if (failure) throw failure;
-      while (ready.length + inWork.size < pool.size + AHEAD && pool.idle > 0) {
+      while (ready.length + inWork.size < pool.size + AHEAD && pool.free > 0) {
         const chunk = feed.next(refine, reading !== undefined && inWork.size === 0);
         if (chunk === undefined) break;
         start(chunk);
