@@ -24,6 +24,7 @@ import { serveViewers } from '../test/support/viewers.mjs';
 import { makeFiles } from './decoders-files.mjs';
 import { report } from './decoders-report.mjs';
 import { makeSpark, versions } from './peers.mjs';
+import { openHarness } from './harness-page.mjs';
 
 const web = dirname(dirname(fileURLToPath(import.meta.url)));
 
@@ -101,10 +102,7 @@ async function sourceOf(files) {
 
 /** Bytes of scenes of ours in our viewer. */
 async function ourBytesOnGpu(browser, server, files) {
-  const page = await browser.newPage();
-  await page.goto(`${server.url}/bench/harness.html`);
-  await page.waitForFunction(() => document.title === 'ready');
-  await page.evaluate(() => window.bench.start());
+  const page = await openHarness(browser, server);
   const found = {};
   for (const [i, name] of Object.keys(files).entries()) {
     if (!name.startsWith('.lexi')) continue;

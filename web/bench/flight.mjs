@@ -14,6 +14,7 @@ import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 import { launch, psnr, serve } from '../test/support/chromium.mjs';
 import { decodePng } from '../test/support/png.mjs';
+import { openHarness } from './harness-page.mjs';
 
 const web = dirname(dirname(fileURLToPath(import.meta.url)));
 const text = (value) => ({ type: 'string', default: value });
@@ -27,12 +28,7 @@ const names = JSON.parse(readFileSync(cameras, 'utf8')).map((camera) => camera.i
 
 const server = await serve({ '/': web, '/scene': dirname(scene), '/cameras': dirname(cameras) }, { rate: values.rate && Number(values.rate) });
 const browser = await launch(['--disable-gpu-watchdog']);
-const page = await browser.newPage();
-page.on('pageerror', (error) => console.error(error.message));
-page.setDefaultTimeout(0);
-await page.goto(`${server.url}/bench/harness.html`);
-await page.waitForFunction(() => document.title === 'ready');
-await page.evaluate(() => window.bench.start());
+const page = await openHarness(browser, server, { timeout: 0 });
 await page.evaluate(([w, h]) => window.bench.resize(w, h), [width, height]);
 const began = performance.now();
 await page.evaluate(([url, budget, blob]) => window.bench.begin(url, budget, blob), [`/scene/${basename(scene)}`, { splats: budget, bytes }, values.blob]);

@@ -8,6 +8,7 @@ import { basename, dirname, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 import { launch, serve } from '../test/support/chromium.mjs';
+import { openHarness } from './harness-page.mjs';
 
 const web = dirname(dirname(fileURLToPath(import.meta.url)));
 const { values, positionals } = parseArgs({
@@ -18,12 +19,7 @@ const [scene] = positionals;
 const server = await serve({ '/': web, '/scene': dirname(resolve(scene)) });
 // Software takes longer for a frame of this size than Chromium waits for a GPU.
 const browser = await launch(['--disable-gpu-watchdog']);
-const page = await browser.newPage();
-page.on('pageerror', (error) => console.error(error.message));
-page.setDefaultTimeout(0);
-await page.goto(`${server.url}/bench/harness.html`);
-await page.waitForFunction(() => document.title === 'ready');
-await page.evaluate(() => window.bench.start());
+const page = await openHarness(browser, server, { timeout: 0 });
 const mebibytes = (bytes) => `${(bytes / 2 ** 20).toFixed(0)} MiB`;
 const { info, milliseconds, report } = await page.evaluate(([url, memory]) => window.bench.load(url, 0, memory).then(({ info, milliseconds, report }) => ({ info, milliseconds, report })), [`/scene/${basename(scene)}`, Number(values.memory)]);
 const heap = await page.evaluate(() => performance.memory?.usedJSHeapSize ?? 0);

@@ -14,6 +14,7 @@ import { parseArgs } from 'node:util';
 import { open } from 'lexisplat';
 import { launch, psnr, serve } from '../test/support/chromium.mjs';
 import { decodePng } from '../test/support/png.mjs';
+import { openHarness } from './harness-page.mjs';
 
 const web = dirname(dirname(fileURLToPath(import.meta.url)));
 const { values, positionals } = parseArgs({
@@ -78,11 +79,7 @@ try {
     const pictures = readdirSync(folder).sort().map((picture) => decodePng(readFileSync(join(folder, picture))));
 
     const server = await serve({ '/': web, '/scene': dirname(resolve(scene)), '/scratch': scratch });
-    const page = await browser.newPage();
-    page.on('pageerror', (error) => console.error(error.message));
-    await page.goto(`${server.url}/bench/harness.html`);
-    await page.waitForFunction(() => document.title === 'ready');
-    await page.evaluate(() => window.bench.start());
+    const page = await openHarness(browser, server);
     const loaded = await page.evaluate((url) => window.bench.load(url), `/scene/${name}`);
     await page.evaluate((url) => window.bench.cameras(url), `/scratch/${name}.json`);
     const found = [];

@@ -15,6 +15,7 @@ import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 import { launch, psnr, serve } from '../test/support/chromium.mjs';
 import { decodePng } from '../test/support/png.mjs';
+import { openHarness } from './harness-page.mjs';
 
 /** Test views that are compared, and their width in pixels. */
 const VIEWS = 3;
@@ -31,14 +32,6 @@ const [program, ply, scene, cameras] = positionals;
 
 const scratch = mkdtempSync(join(tmpdir(), 'lexisplat-stream-'));
 const browser = await launch();
-const open = async (server) => {
-  const page = await browser.newPage();
-  page.on('pageerror', (error) => console.error(error.message));
-  await page.goto(`${server.url}/bench/harness.html`);
-  await page.waitForFunction(() => document.title === 'ready');
-  await page.evaluate(() => window.bench.start());
-  return page;
-};
 try {
   const all = JSON.parse(readFileSync(cameras, 'utf8'));
   const test = all.filter((camera) => camera.split === 'test');
@@ -50,7 +43,7 @@ try {
 
   const bytes = readFileSync(scene);
   const server = await serve({ '/': web, '/scratch': scratch });
-  let page = await open(server);
+  let page = await openHarness(browser, server);
   // The page and the scene have different origins, as on the web.
   const slow = createServer((request, response) => send(response, bytes, Number(values.rate)));
   await new Promise((done) => slow.listen(0, '127.0.0.1', done));
@@ -65,7 +58,7 @@ try {
   slow.close();
   await page.close();
 
-  page = await open(server);
+  page = await openHarness(browser, server);
   const part = bytes.subarray(0, Math.floor((bytes.length * Number(values.share)) / 100));
   const stopped = createServer((request, response) => {
     response.writeHead(200, { 'content-length': bytes.length, 'access-control-allow-origin': '*' });

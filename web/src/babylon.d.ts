@@ -37,7 +37,7 @@ declare module '@babylonjs/core/Loading/sceneLoader.js' {
  */
 export function registerLexi(options?: LexiLoaderOptions): void;
 
-/** What `registerLexi` gives to RegisterSceneLoaderPlugin. */
+/** The plugin that `registerLexi` gives to RegisterSceneLoaderPlugin. */
 export class LexiFileLoader implements ISceneLoaderPluginAsync, ISceneLoaderPluginFactory {
   constructor(options?: LexiLoaderOptions);
   readonly name: 'lexi';

@@ -92,7 +92,7 @@ export function registerLexi(options) {
   RegisterSceneLoaderPlugin(new LexiFileLoader(options));
 }
 
-// What is made for a container is in no scene, which Babylon's own loaders say by this.
+// A mesh of a container is in no scene, which Babylon's own loaders say by this.
 function within(scene, container, make) {
   const before = scene._blockEntityCollection;
   scene._blockEntityCollection = container !== null;

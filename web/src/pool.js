@@ -6,6 +6,8 @@ const FAULT = 'the decoder failed, perhaps for lack of memory';
 const NO_SCRIPT = "its script could not be loaded: is it where the package's other files are, and does the page allow it (worker-src)?";
 
 export class Pool {
+  /** Milliseconds that workers took for their answers, those of all workers added up. */
+  milliseconds = 0;
   #workers = [];
   #next = 1;
 
@@ -18,7 +20,13 @@ export class Pool {
     if (count === 0) {
       const handle = env.handler();
       // A turn of the event loop lets the page breathe between two chunks.
-      const ask = async (message, _, onPart) => (await turn(), handle(message, onPart).reply);
+      const ask = async (message, _, onPart) => {
+        await turn();
+        const began = performance.now();
+        const { reply } = handle(message, onPart);
+        pool.milliseconds += performance.now() - began;
+        return reply;
+      };
       pool.#workers.push({ ask, busy: 0, stop() {} });
       return pool;
     }
@@ -35,7 +43,7 @@ export class Pool {
       waiting.clear();
     };
     listen('message', (event) => {
-      const { id, reply, part, error, fatal } = worker.on ? event : event.data;
+      const { id, reply, part, milliseconds = 0, error, fatal } = worker.on ? event : event.data;
       const { resolve, reject, onPart } = waiting.get(id) ?? {};
       if (part !== undefined) {
         try {
@@ -48,6 +56,7 @@ export class Pool {
         return;
       }
       waiting.delete(id);
+      this.milliseconds += milliseconds;
       if (waiting.size === 0) worker.unref?.();
       if (error !== undefined) reject?.(new Error(fatal ? `lexisplat: ${FAULT} (${error})` : error));
       else resolve?.(reply);

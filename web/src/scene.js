@@ -61,12 +61,12 @@ export class Scene {
  * @param {object} input.feed takes them
  * @param {Pool} input.pool decodes
  */
-export async function* streamed({ source, feed, pool, options, as, refine, stats = {} }) {
+export async function* streamed({ source, feed, pool, options, as, refine }) {
   const { signal, onProgress } = options;
   const header = JSON.parse(feed.header());
   const total = header.bytes;
-  stats.loaded ??= 0;
-  stats.decoded ??= 0;
+  let loaded = 0;
+  let decoded = 0;
   const ready = [];
   const inWork = new Set();
   const seen = new Set();
@@ -74,7 +74,7 @@ export async function* streamed({ source, feed, pool, options, as, refine, stats
   let reading;
   let isRead = false;
 
-  const report = () => onProgress?.({ loaded: stats.loaded, total, decoded: stats.decoded, gaussians: header.gaussians });
+  const report = () => onProgress?.({ loaded, total, decoded, gaussians: header.gaussians });
   // Reads one piece. What the feed has no room for is read when chunks were decoded.
   const read = async () => {
     const end = (await feedOnce(feed, source, signal)) ?? (feed.ask_again() ? await feedOnce(feed, source, signal) : undefined);
@@ -82,7 +82,7 @@ export async function* streamed({ source, feed, pool, options, as, refine, stats
       isRead = true;
       return;
     }
-    stats.loaded = Math.max(stats.loaded, end);
+    loaded = Math.max(loaded, end);
     report();
   };
   const start = (chunk) => {
@@ -90,10 +90,8 @@ export async function* streamed({ source, feed, pool, options, as, refine, stats
     const job = feed.job(chunk, refine);
     // There may be room for more bytes now.
     isRead = false;
-    const clock = performance.now();
     const work = pool.ask({ type: 'job', job, as }, [job.buffer]).then((arrays) => {
-      stats.milliseconds = (stats.milliseconds ?? 0) + performance.now() - clock;
-      if (!seen.has(chunk)) stats.decoded += arrays.count;
+      if (!seen.has(chunk)) decoded += arrays.count;
       seen.add(chunk);
       ready.push({ index: chunk, layer: feed.layer(chunk), complete: isFinal, ...arrays });
       report();

@@ -15,8 +15,9 @@ export function serve(start, handlerOf, port = globalThis) {
         port.postMessage({ id });
         return;
       }
+      const began = performance.now();
       const { reply, transfer } = handle(message, (part, buffers) => port.postMessage({ id, part }, buffers));
-      port.postMessage({ id, reply }, transfer);
+      port.postMessage({ id, reply, milliseconds: performance.now() - began }, transfer);
     } catch (error) {
       // After a fault of the WebAssembly itself its memory is not to be trusted.
       const fatal = error instanceof WebAssembly.RuntimeError;

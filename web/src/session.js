@@ -42,8 +42,8 @@ const UNLIMITED = { splats: Infinity, bytes: Infinity };
  */
 export async function show(source, { env, onProgress, signal, budget = UNLIMITED, memory = Infinity, ...on }) {
   const input = { source: sourceOf(source), feed: undefined };
-  const stats = { milliseconds: 0 };
-  const report = (progress) => onProgress?.({ ...progress, ms: stats.milliseconds });
+  let pool;
+  const report = (progress) => onProgress?.({ ms: pool?.milliseconds ?? 0, ...progress });
   const options = watched(input.source, { memory: MEMORY, shParts: ALL_PARTS, signal, onProgress: report });
   let stream;
   let starting;
@@ -58,8 +58,8 @@ export async function show(source, { env, onProgress, signal, budget = UNLIMITED
     starting = Pool.of(env.workers, { module: env.wasm, worker: env.worker, handler: () => viewerHandlerOf(wasm) });
     starting.catch(() => {});
     const start = await readStart(input.source, signal);
-    const pool = await starting;
-    const given = { input, start, pool, options, stats, memory, ...on };
+    pool = await starting;
+    const given = { input, start, pool, options, memory, ...on };
     if (start.version !== PACKED) return { info: await whole(given) };
     const header = await startFeed(input, wasm, start, options);
     await startDecoders(pool, input, options);
@@ -70,10 +70,8 @@ export async function show(source, { env, onProgress, signal, budget = UNLIMITED
     let info;
     ({ stream, info } = within({ ...given, header, budget: { ...budget, splats } }));
     on.onStream?.(stream);
-    let isWhole = false;
-    stream.run().finally(close).catch((error) => isWhole && on.onFail?.(error));
+    stream.run().finally(close).catch((error) => stream.isWhole && on.onFail?.(error));
     await stream.whole;
-    isWhole = true;
     return { info };
   } finally {
     if (!stream) close();
@@ -81,13 +79,13 @@ export async function show(source, { env, onProgress, signal, budget = UNLIMITED
 }
 
 /** Shows a packed file while it comes, at most `splats` Gaussians. */
-async function layered({ input, pool, options, stats, header, splats, onForm, onPart }) {
+async function layered({ input, pool, options, header, splats, onForm, onPart }) {
   const { name } = input.source;
   const shown = input.feed.give_up(Math.min(header.gaussians, splats));
   if (shown === 0 && header.gaussians > 0) throw new Error(`${name}: its first chunk has more than the ${splats} Gaussians that there is room for`);
   const info = { ...header, name, shown };
   let isFormed = false;
-  for await (const chunk of streamed({ ...input, pool, options, as: 'gpu', refine: true, stats })) {
+  for await (const chunk of streamed({ ...input, pool, options, as: 'gpu', refine: true })) {
     if (!isFormed) await onForm(chunk.form, info);
     isFormed = true;
     await onPart(chunk.index, chunk.part);
@@ -96,7 +94,7 @@ async function layered({ input, pool, options, stats, header, splats, onForm, on
 }
 
 /** Begins to show what a view shows of a packed file. */
-function within({ input, pool, options, stats, header, budget, onForm, onChange }) {
+function within({ input, pool, options, header, budget, onForm, onChange }) {
   const { source, feed } = input;
   // The stream takes what came to the feed.
   const core = new wasm.Stream(feed);
@@ -107,28 +105,14 @@ function within({ input, pool, options, stats, header, budget, onForm, onChange 
     isFormed ||= parts.length > 0;
     await onChange({ removed, parts });
   };
-  let isWhole = false;
   const progress = () => {
-    if (isWhole) return;
+    if (stream.isWhole) return;
     const { bytes, held, drawn, splats } = stream.state;
     options.onProgress?.({ loaded: Math.min(bytes, held), total: bytes, decoded: drawn, gaussians: splats });
   };
-  const stream = new Stream({ source, core, pool: timed(pool, stats), budget, signal: options.signal }, { change, progress });
-  stream.whole.then(() => (isWhole = true)).catch(() => {});
+  const stream = new Stream({ source, core, pool, budget, signal: options.signal }, { change, progress });
   const info = { ...header, name: source.name, shown: stream.state.splats, budget: budget.splats };
   return { stream, info };
-}
-
-/** `pool`, whose answers' milliseconds are added up. */
-function timed(pool, stats) {
-  return {
-    async ask(...message) {
-      const clock = performance.now();
-      const answer = await pool.ask(...message);
-      stats.milliseconds += performance.now() - clock;
-      return answer;
-    },
-  };
 }
 
 function mostGaussians(memory) {
@@ -136,7 +120,7 @@ function mostGaussians(memory) {
 }
 
 /** Shows a file that is read whole. */
-async function whole({ input: { source }, start, pool, options, stats, memory, onForm, onPart }) {
+async function whole({ input: { source }, start, pool, options, memory, onForm, onPart }) {
   const { name } = source;
   const bytes = await readWhole(source, start.bytes, { ...options, memory: Infinity });
   const loaded = bytes.length;
@@ -159,8 +143,7 @@ async function whole({ input: { source }, start, pool, options, stats, memory, o
       decoded += count;
       take(() => onPart(index, part));
     }
-    stats.milliseconds = performance.now() - clock;
-    options.onProgress({ loaded, total: loaded, decoded, gaussians: info.gaussians });
+    options.onProgress({ ms: performance.now() - clock, loaded, total: loaded, decoded, gaussians: info.gaussians });
   });
   await taken;
   if (refusal) throw refusal;

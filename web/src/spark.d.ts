@@ -7,7 +7,7 @@ export interface There {
   of: number;
 }
 
-/** What values a PackedSplats can hold: by default colours from 0 to 1, SH from -1 to 1, logarithms of scales from -12 to 9. */
+/** Ranges of the values that a PackedSplats can hold: by default colours from 0 to 1, SH from -1 to 1, logarithms of scales from -12 to 9. */
 export interface Ranges {
   rgbMin?: number;
   rgbMax?: number;
@@ -19,7 +19,7 @@ export interface Ranges {
   sh3Max?: number;
 }
 
-/** What Spark does with files of its own kinds, which a .lexi does not go through. */
+/** Options of SplatMesh for files of Spark's own kinds, which mean nothing for a .lexi. */
 type OfOtherFiles =
   | 'url' | 'fileBytes' | 'fileType' | 'fileName' | 'stream' | 'streamLength' | 'packedSplats' | 'splats' | 'maxSplats'
   | 'constructSplats' | 'extSplats' | 'covSplats' | 'splatEncoding' | 'lod' | 'lodAbove' | 'nonLod' | 'paged' | 'onProgress';

@@ -1,4 +1,4 @@
-// What of a scene is there while its chunks come, and when a viewer should be given it anew.
+// The Gaussians of a scene that are there while its chunks come, and when a viewer should be given them anew.
 
 // A viewer takes all of a scene each time. It is given one when this many times more Gaussians are there than the last
 // time: all of them together then have fewer Gaussians than the scene has twice.

@@ -16,6 +16,8 @@ const PAUSE = 200;
 export class Stream {
   /** Resolves when all that the first view shows is drawn. Rejects if that fails. */
   whole;
+  /** Whether it was. */
+  isWhole = false;
   #source;
   #core;
   #pool;
@@ -28,6 +30,7 @@ export class Stream {
   #chosen = { splats: 0, bytes: 0 };
   #counts = new Map();
   #looked = -Infinity;
+  #timer;
   #isLooking = false;
   #requests = 0;
   #isChanging = false;
@@ -60,7 +63,7 @@ export class Stream {
     this.#choose(core.begin(budget.splats));
   }
 
-  /** What was chosen for the view, and what is there of it. */
+  /** Numbers of Gaussians and bytes that were chosen for the view, and of those that are there. */
   get state() {
     const drawn = [...this.#counts.values()].reduce((sum, count) => sum + count, 0);
     return { ...this.#chosen, drawn, held: this.#core?.held() ?? 0, complete: this.#isComplete };
@@ -103,6 +106,7 @@ export class Stream {
         this.#request();
         this.#change();
         if (this.#isComplete) {
+          this.isWhole = true;
           this.#first.resolve();
           this.#settled.resolve();
           this.#settled = Promise.withResolvers();
@@ -141,9 +145,11 @@ export class Stream {
     if (!this.#eye) return;
     const left = this.#looked + PAUSE - performance.now();
     if (left > 0) {
-      setTimeout(() => this.#wake(), left);
+      this.#timer ??= setTimeout(() => this.#wake(), left);
       return;
     }
+    clearTimeout(this.#timer);
+    this.#timer = undefined;
     this.#looked = performance.now();
     this.#isLooking = true;
     [this.#last, this.#eye] = [this.#eye, undefined];

@@ -1,72 +1,37 @@
 // PlayCanvas from npm, in Chromium, draws a .lexi from codes as it draws the same scene as a PLY.
 
 import assert from 'node:assert/strict';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { after, before, test } from 'node:test';
+import { test } from 'node:test';
 import { open } from 'lexisplat';
-import { launch, npm, psnr, shot } from './support/chromium.mjs';
-import { plyOf } from './support/ply.mjs';
-import { dense, golden, lit, openViewer, serveViewers } from './support/viewers.mjs';
+import { psnr } from './support/chromium.mjs';
+import { ALIKE, SIZE, assertAlike, dense, golden, picturesOf, setUp } from './support/viewers.mjs';
 import { orbit } from './support/views.mjs';
 
-// What the issue asks for, dB.
-const ALIKE = 45;
-// Pixels.
-const SIZE = 256;
 // A half float's relative error is at most 2^-11; values and atoms are half floats, and a few of their products are summed.
 const HALVES = 2 ** -8;
 // The largest half float.
 const MOST = 65504;
-const folder = mkdtempSync(join(tmpdir(), 'lexisplat-playcanvas-'));
-const skip = npm ? false : 'LEXISPLAT_NPM names no folder with playcanvas and playwright-core';
-let browser;
-let server;
-// Opening a page costs seconds without a GPU, so tests share one for each backend.
-const viewers = {};
-
-const shown = (backend = 'webgl2') =>
-  (viewers[backend] ??= openViewer(browser, `${server.url}/test/support/playcanvas.html?${backend}`));
-
-before(async () => {
-  if (skip) return;
-  const examples = { '/examples/scene.lexi': join(golden, 'packed3_layers.lexi') };
-  server = await serveViewers({ '/golden': golden, '/ply': folder, ...examples });
-  browser = await launch();
-});
-
-after(async () => {
-  await browser?.close();
-  await server?.close();
-  rmSync(folder, { recursive: true });
-});
+const { skip, folder, shown, decompressed, assertExampleDraws } = setUp('playcanvas', 'playcanvas');
 
 for (const [backend, count] of [['webgl2', 2], ['webgpu', 1]]) {
   test(`${backend}: pictures are alike`, { skip }, async () => {
-    const { header, chunk } = await dense('packed3_layers');
-    writeFileSync(join(folder, 'packed3_layers.ply'), plyOf(header.degree, chunk));
+    const { chunk } = await decompressed('packed3_layers');
     const viewer = await shown(backend);
     assert.equal(await viewer.call('backend'), backend);
     const views = orbit(chunk.positions, count, SIZE);
-    await viewer.call('show', { url: '/ply/packed3_layers.ply' });
-    const theirs = [];
-    for (const view of views) theirs.push(await viewer.picture(view));
-    await viewer.call('show', { url: '/golden/packed3_layers.lexi' });
+    const theirs = await picturesOf(viewer, views, { url: '/ply/packed3_layers.ply' });
+    const ours = await picturesOf(viewer, views, { url: '/golden/packed3_layers.lexi' });
     assert.equal(await viewer.call('gaussians'), chunk.count);
-    for (const [i, view] of views.entries()) {
-      const ours = await viewer.picture(view);
-      assert.ok(lit(ours) > 0.1, 'something is drawn');
-      const alike = psnr(ours, theirs[i]);
-      assert.ok(alike >= ALIKE, `view ${i}: ${alike} dB`);
-    }
+    assertAlike(ours, theirs);
     // The shaders have another branch for escapes.
     await viewer.call('showEscaped', '/golden/packed3_layers.lexi');
     const alike = psnr(await viewer.picture(views[0]), theirs[0]);
     assert.ok(alike >= ALIKE, `as escapes: ${alike} dB`);
     assert.deepEqual(viewer.faults, []);
     if (backend === 'webgpu') await viewer.page.close();
-    });
+  });
 }
 
 // What the shaders do, step by step in numbers.
@@ -109,7 +74,7 @@ function assertSame(held, sh, gaussians, name) {
 }
 
 test('on the GPU are a code word and geometry a Gaussian, a word a nonzero, and the dictionary', { skip }, async () => {
-  const viewer = await shown();
+  const viewer = await shown('webgl2');
   const scene = await open(readFileSync(join(golden, 'packed3_layers.lexi')), { workers: 0 });
   const { count, codes } = await scene.all({ as: 'codes' });
   scene.close();
@@ -123,7 +88,7 @@ test('on the GPU are a code word and geometry a Gaussian, a word a nonzero, and 
 });
 
 test('codes in textures stand for the SH of every layout, escapes included', { skip }, async () => {
-  const viewer = await shown();
+  const viewer = await shown('webgl2');
   const cases = [['f16', 3], ['f32', 3], ['paper', 2], ['degree1_u16_escapes', 1], ['degree4', 3], ['packed3', 3], ['packed3_escapes', 1]];
   for (const [name, bands] of cases) {
     const { chunk } = await dense(name);
@@ -138,7 +103,7 @@ test('codes in textures stand for the SH of every layout, escapes included', { s
 });
 
 test('a code of too many nonzeros is made dense', { skip }, async () => {
-  const viewer = await shown();
+  const viewer = await shown('webgl2');
   // 70 nonzeros of one Gaussian between two others, at degree 1: atom a is a vector of which only value a % 9 is not 0.
   const counts = [1, 70, 2];
   const indices = Array.from({ length: 73 }, (_, n) => n % 9);
@@ -156,7 +121,7 @@ test('a code of too many nonzeros is made dense', { skip }, async () => {
 
 test('what is no .lexi is told, and an asset that is unloaded stays so', { skip }, async () => {
   writeFileSync(join(folder, 'wrong.lexi'), 'ply\nformat ascii 1.0\nend_header\n');
-  const viewer = await shown();
+  const viewer = await shown('webgl2');
   await assert.rejects(viewer.call('show', { url: '/ply/wrong.lexi' }), /not a .lexi/);
   await assert.rejects(viewer.call('show', { url: '/golden/none.lexi' }), /404/);
   assert.equal(await viewer.call('unloaded', '/golden/packed3_layers.lexi'), null);
@@ -164,14 +129,4 @@ test('what is no .lexi is told, and an asset that is unloaded stays so', { skip 
   assert.equal(await viewer.call('gaussians'), 2600);
 });
 
-test('the example draws', { skip }, async () => {
-  const page = await browser.newPage({ viewport: { width: SIZE, height: SIZE } });
-  const faults = [];
-  page.on('pageerror', (error) => faults.push(String(error)));
-  await page.goto(`${server.url}/examples/playcanvas.html`);
-  let picture;
-  do picture = await shot(page, 'canvas');
-  while (lit(picture) < 0.1 && faults.length === 0);
-  assert.deepEqual(faults, []);
-  await page.close();
-});
+test('the example draws', { skip }, () => assertExampleDraws());

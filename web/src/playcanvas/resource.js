@@ -13,11 +13,10 @@ import {
   Vec2,
 } from 'playcanvas';
 import { atomTexels, codeWords } from '../codewords.js';
+import { SH_C0 } from '../rows.js';
 import { GLSL, WGSL } from './shaders.js';
 
 const half = FloatPacking.float2Half;
-// Colour of a base colour's coefficient: 1 / (2 sqrt(pi)), and grey where it is 0.
-const SH_C0 = 0.28209479177387814;
 // PlayCanvas draws no SH of a higher degree.
 const MOST_DEGREE = 3;
 // Bounds of a Gaussian in standard deviations, as PlayCanvas takes them.

@@ -2,9 +2,8 @@
 // (splatDefines.glsl), and evaluatePackedSH1 to 3 in PackedSplats.
 
 import { half } from '../half.js';
+import { SH_C0 } from '../rows.js';
 
-// Colour of a base colour's coefficient: 1 / (2 sqrt(pi)), and grey where it is 0.
-const SH_C0 = 0.28209479177387814;
 // Ranges of values, as Spark takes those of a PLY (DEFAULT_SPLAT_ENCODING).
 const ENCODING = { rgbMin: 0, rgbMax: 1, lnScaleMin: -12, lnScaleMax: 9, sh1Max: 1, sh2Max: 1, sh3Max: 1, lodOpacity: false };
 // Gaussians beside each other in a row of a texture, and most rows of one of its layers.
@@ -75,7 +74,7 @@ export class Packing {
     }
   }
 
-  // Theirs has the three channels of a coefficient beside each other, ours is channel by channel.
+  // Spark has the three channels of a coefficient beside each other, a chunk is channel by channel.
   #writeBand({ name, begin, coefficients, bits, words }, { first, count, sh }) {
     const packed = this.extra[name];
     const most = 2 ** (bits - 1) - 1;

@@ -50,11 +50,11 @@ export interface ViewerReport {
   degree: number | null;
   background: [number, number, number];
   models: [ViewerModel | null, ViewerModel | null];
-  /** What is drawn of each scene of which only a part is drawn. */
+  /** The parts that are drawn of scenes with more Gaussians than the budget; undefined for other scenes. */
   streams: (StreamState | undefined)[];
 }
 
-/** A scene with more Gaussians than the budget: what was chosen for the view, and what is there. */
+/** A scene with more Gaussians than the budget: numbers of Gaussians and bytes. */
 export interface StreamState {
   /** Gaussians, and bytes of the file, that were chosen. */
   splats: number;

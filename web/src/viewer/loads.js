@@ -138,7 +138,7 @@ export class Loads {
     for (const load of this.slots) if (load?.stream) load.stream.budget = budget;
   }
 
-  /** What was chosen of each scene of which a part is drawn, and what is there of it. */
+  /** The states of the streams of both scenes; undefined for a scene that is drawn whole. */
   get streams() {
     return this.slots.map((load) => load?.stream?.state);
   }
