@@ -42,6 +42,8 @@ export interface Header {
   atoms: number;
   /** Trained with the anti-aliased dilation, which a viewer should use too. */
   antialiased: boolean;
+  /** The view from which viewers show the scene first, as the text of their links; undefined if the file states none. */
+  view?: string;
   /** Number of chunks and layers. */
   chunks: number;
   layers: number;

@@ -43,7 +43,7 @@ export async function openWith(env, source, options) {
     pool = await starting;
     await startDecoders(pool, input, settings);
     const dictionary = { atoms: header.atoms, rest: restOf(header.degree), values: input.feed.dictionary() };
-    return new Scene({ input, options: settings, header, dictionary, pool });
+    return new Scene({ input, options: settings, header: { ...header, view: start.view }, dictionary, pool });
   } catch (error) {
     input.source.close();
     input.feed?.free();
@@ -79,7 +79,7 @@ export function restOf(degree) {
 const WEB_PAGE = /^\s*<(!doctype html|html)/i;
 
 /**
- * The first bytes of a file, and its version if it is a .lexi.
+ * The first bytes of a file, and, if it is a .lexi, its version and the view from which it is shown first.
  * @throws {Error} if the file is empty, or a web page
  */
 export async function readStart(source, signal) {
@@ -108,7 +108,8 @@ export async function readStart(source, signal) {
   if (view.getUint32(4, true) > 0 || length > MOST_HEADER || !(await reach(LENGTH + length))) return { bytes, version: undefined };
   try {
     const header = JSON.parse(new TextDecoder().decode(bytes.subarray(LENGTH, LENGTH + length)));
-    return { bytes, version: header.__metadata__?.version };
+    const { version, view } = header.__metadata__ ?? {};
+    return { bytes, version, view };
   } catch {
     return { bytes, version: undefined };
   }
@@ -150,5 +151,5 @@ async function wholeScene({ input, settings, pool, start }) {
     settings.onProgress?.({ loaded: header.bytes, total: header.bytes, decoded: chunk.count, gaussians: chunk.count });
     return { index: 0, layer: 0, complete: true, ...chunk };
   };
-  return new Scene({ input, options: settings, header: { version: Number(start.version), ...header }, dictionary: scene, whole, pool });
+  return new Scene({ input, options: settings, header: { version: Number(start.version), ...header, view: start.view }, dictionary: scene, whole, pool });
 }

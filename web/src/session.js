@@ -65,10 +65,10 @@ export async function show(source, { env, onProgress, signal, budget = UNLIMITED
     await startDecoders(pool, input, options);
     const splats = Math.min(budget.splats, mostGaussians(memory));
     if (header.gaussians <= splats || !(await input.source.hasRanges(signal))) {
-      return { info: await layered({ ...given, header, splats }) };
+      return { info: await layered({ ...given, header: { ...header, view: start.view }, splats }) };
     }
     let info;
-    ({ stream, info } = within({ ...given, header, budget: { ...budget, splats } }));
+    ({ stream, info } = within({ ...given, header: { ...header, view: start.view }, budget: { ...budget, splats } }));
     on.onStream?.(stream);
     stream.run().finally(close).catch((error) => stream.isWhole && on.onFail?.(error));
     await stream.whole;
@@ -133,7 +133,7 @@ async function whole({ input: { source }, start, pool, options, memory, onForm, 
   await pool.ask({ type: 'scene', name, bytes }, [bytes.buffer], ({ form, head, index, part, count }) => {
     options.signal?.throwIfAborted();
     if (form) {
-      info = { ...head, name, shown: head.gaussians };
+      info = { ...head, name, shown: head.gaussians, view: start.view };
       const needed = head.gaussians * (GEOMETRY + COEFFICIENT * 4 * Math.ceil((3 * (head.degree + 1) ** 2) / 4));
       if (needed > memory * SCENE_SHARE) {
         throw new Error(`${name}: it takes ${needed} bytes of graphics memory as it is, and ${memory} are allowed; a .lexi made of it takes less`);

@@ -1,6 +1,7 @@
 // The page, the element and the page of one file with the real WebAssembly, drawn by WebGPU in Chromium.
 
 import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
 import { existsSync } from 'node:fs';
 import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { createServer } from 'node:http';
@@ -25,6 +26,7 @@ const SAME = 45;
 // The least share of pixels that a scene lights.
 const LIT = 0.1;
 
+const program = process.env.LEXISPLAT_PROGRAM;
 const missing = !npm ? 'LEXISPLAT_NPM is not set' : ![wasm, golden].every(existsSync) && 'the viewer or the golden files are missing';
 
 describe('the viewer with WebGPU', { skip: missing }, () => {
@@ -102,6 +104,15 @@ describe('the viewer with WebGPU', { skip: missing }, () => {
     await page.waitForFunction((name) => document.title === name, SCENE);
     const again = await rested();
     assert.ok(psnr(view, again) > SAME, `${psnr(view, again)} dB`);
+  });
+
+  test('the page begins with the view that the file states', { skip: !program && 'LEXISPLAT_PROGRAM is not set' }, async () => {
+    execFileSync(program, ['convert', join(golden, SCENE), join(folder, 'seen.lexi'), '--view', '0:0:-9:0:0:0:1:9:1.25', '--quiet']);
+    await open(pageOf('?url=/made/seen.lexi'), { permissions: ['clipboard-read', 'clipboard-write'] });
+    await page.waitForFunction((name) => document.title === name, 'seen.lexi');
+    await page.getByRole('button', { name: 'Copy a link' }).click();
+    await message('The link was copied');
+    assert.match(decodeURIComponent(page.url()), /#view=0:0:-9:0:0:0:1:9:1.25&/);
   });
 
   test('a cut connection leaves what had come', async () => {

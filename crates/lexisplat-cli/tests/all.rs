@@ -9,6 +9,7 @@ mod demo;
 mod determinism;
 mod eval;
 mod first;
+mod first_view;
 mod folder;
 mod gpu;
 mod html;

@@ -26,18 +26,18 @@ const GAUSSIANS_DRAWN: usize = 128_000_000;
 /// Width and height of generated views, in pixels.
 pub(crate) const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Width and height of the small pictures, in pixels.
-const SMALL: [u32; 2] = [96, 64];
+pub(crate) const SMALL: [u32; 2] = [96, 64];
 /// Smallest opacity in the small pictures, 5 %, before the sigmoid.
 const FAINT: f32 = -3.0;
 /// A pixel shows something if one of its channels is above this value.
 const LIT: f32 = 0.02;
 /// Least share of lit pixels in a view that looks at the scene, as a multiple of the median share. Views with less look
 /// past the scene.
-const LEAST_LIT: f64 = 0.9;
+pub(crate) const LEAST_LIT: f64 = 0.9;
 /// Least median share of lit pixels in a scene with a background. With a lower median the scene is an object before
 /// nothing, and pictures of such an object show all of it. The median is 0.9 to 1 for six captures with a background, and
 /// 0.45 for lego.
-const BARE: f64 = 0.7;
+pub(crate) const BARE: f64 = 0.7;
 
 /// Views like photographs, in descending order of detail.
 #[derive(Debug)]
@@ -150,7 +150,7 @@ pub(crate) fn evenly(splats: &Splats, count: usize) -> Vec<Camera> {
 /// Returns two lists of natural views of `splats` to try. The first has views from likely places of photographs. It is
 /// empty if no colour depends on the view. The second has views from which Gaussians look most alike in size. Without the
 /// first list it has `count` views; otherwise both have half as many.
-fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {
+pub(crate) fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {
     let views = natural_views(&splats.geometry, CHOICE * count, GENERATED_SIZE);
     let sizes = Sizes::of(&splats.geometry);
     let sizes: Vec<SizesSeen> = views.iter().map(|view| sizes.seen_from(view.position)).collect();
@@ -185,7 +185,7 @@ pub(crate) fn sketch(splats: &Splats) -> Splats {
 }
 
 /// Returns the share of the pixels that show something.
-fn lit(picture: &Image) -> f64 {
+pub(crate) fn lit(picture: &Image) -> f64 {
     let lit = picture.pixels.iter().filter(|pixel| pixel.iter().any(|value| *value > LIT)).count();
     lit as f64 / picture.pixels.len().max(1) as f64
 }

@@ -37,6 +37,7 @@ mod drawing;
 mod error;
 mod facts;
 mod fewer;
+mod first_view;
 mod found;
 mod interim;
 mod judge;
@@ -60,6 +61,7 @@ mod solve;
 mod target;
 pub mod tiles;
 pub mod views;
+mod with_view;
 
 pub use beginning::{Compress, Source, compress};
 pub use decibels::decibels;
@@ -77,6 +79,7 @@ pub use views::{
     ChosenViews, DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SplitFilter, View, ViewOptions,
     Viewpoints, cameras_beside, choose_views, find_views, photo, read_beside,
 };
+pub use with_view::WithView;
 
 #[cfg(test)]
 mod tests {

@@ -8,6 +8,7 @@ use lexisplat_render::{Camera, Renderer};
 use crate::belonging::belong;
 use crate::error::{Error, Result};
 use crate::fewer::at_most;
+use crate::first_view::first_view;
 use crate::judge::{Judge, reached};
 use crate::packing::{Compression, Packing, Quality};
 use crate::packing_views::Looked;
@@ -17,6 +18,7 @@ use crate::report::{CompressionReport, SensitivitySource};
 use crate::signs::near_plane_hides;
 use crate::target::{pack_to_preset, pack_to_target};
 use crate::views::Viewpoints;
+use crate::with_view::WithView;
 
 /// Bytes of a Gaussian in a PLY at SH degree 3.
 const PLY_ROW: u64 = 248;
@@ -35,6 +37,9 @@ impl Compression {
 
     /// Compresses `source` into `sink`: a file that appears when it is whole, or any writer. Reports every step to
     /// `progress`, which can cancel. A cancelled compression leaves no file.
+    ///
+    /// The file states the view from which viewers show the scene first: that of the source
+    /// ([`WithView`]), or else the best of the cameras or of generated views. With [`Self::Guessed`] no view is chosen.
     ///
     /// The result is the same for any number of threads. A packed file depends on the memory allowed only in whether the
     /// scene is packed whole.
@@ -61,7 +66,8 @@ impl Compression {
         }
         let mut report = match self {
             Self::Exact(options, codes) => {
-                let done = stream::compress(source, options, *codes, sink, progress)?;
+                let source = WithView::best(source, progress)?;
+                let done = stream::compress(&source, options, *codes, sink, progress)?;
                 CompressionReport::exact(done, Layout::of(*codes, options.values))
             }
             Self::Guessed(preset, options) => {
@@ -114,7 +120,8 @@ impl Packing {
         sink: Sink<'_>,
         progress: &dyn Progress,
     ) -> Result<CompressionReport> {
-        in_parts(&self.options, self.decibels()?, Some(self.renderer()?), source, sink, progress)
+        let source = WithView::best(source, progress)?;
+        in_parts(&self.options, self.decibels()?, Some(self.renderer()?), &source, sink, progress)
     }
 
     /// Returns the given cameras, or else likely cameras that seem to belong to `splats`.
@@ -154,6 +161,13 @@ impl Packing {
                     return self.in_parts(source, sink, progress);
                 }
                 Looked::at(&mut renderer, &splats, cameras, self.viewpoints, progress)?
+            }
+        };
+        let view = match &splats.meta.view {
+            Some(view) => Some(view.clone()),
+            None => {
+                let cameras = views.are_given().then(|| views.measuring());
+                first_view(&*splats, cameras, progress)?.map(|pose| pose.to_string())
             }
         };
         let look_seconds = clock.seconds();
@@ -203,7 +217,11 @@ impl Packing {
             }
         };
         let removed = (splats.len() - packed.len()) as u64;
-        let packed = packed.with_device(device).with_reached(reached(score, &judge)).with_removed(removed);
+        let packed = packed
+            .with_device(device)
+            .with_reached(reached(score, &judge))
+            .with_removed(removed)
+            .with_view(view);
         drop(refitting);
         let pack_seconds = clock.seconds();
 

@@ -45,6 +45,9 @@ impl Edits {
             }
         }
         let offset = |splats: &Splats| Offset::numbers(splats.meta.offset);
+        if self.scale.is_some() || self.rotate.is_some() {
+            splats.meta.view = None;
+        }
         if let Some(scale) = self.scale {
             splats.meta.offset = Offset::new(offset(splats).map(|v| v * scale))?;
             scale_by(splats, scale);

@@ -160,6 +160,7 @@ pub(crate) fn from_python(splats: &Bound<'_, PyAny>) -> PyResult<Splats> {
             comments: splats.getattr("comments")?.extract()?,
             antialiased: splats.getattr("antialiased")?.extract()?,
             offset: offset(splats)?,
+            view: None,
         },
     };
     splats.validate().map_err(|error| crate::errors::raise(py, &error.into()))?;

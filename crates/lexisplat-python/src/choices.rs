@@ -9,9 +9,10 @@ use lexisplat::{
     lexi,
 };
 use lexisplat_compress::{
-    Compression, CompressionReport, Error, Packing, Quality, Target, Viewpoints, choose_layout, read_beside,
+    Compression, CompressionReport, Error, Packing, Quality, Target, Viewpoints, WithView, choose_layout,
+    read_beside,
 };
-use lexisplat_render::{Device, ViewSet};
+use lexisplat_render::{Device, Pose, ViewSet};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -45,6 +46,8 @@ pub(crate) struct Choices {
     /// File of the scene, if cameras that lie beside it should be used.
     beside: Option<PathBuf>,
     views: Option<String>,
+    /// The first view: `auto`, a link, or none.
+    view: Option<String>,
     keep_order: bool,
     lod: bool,
     keep_all: bool,
@@ -254,16 +257,17 @@ pub(crate) fn compress(
     };
     let (bytes, report, unused) = without_gil(py, progress, move |watch| {
         let views = choices.cameras.clone();
+        let view = FirstView::of(choices.view.as_deref())?;
         let beside = choices.beside.clone();
         let compression = choices.compression(device, dictionary)?;
         let beside =
             beside.filter(|_| matches!(compression, Compression::Packed(_))).as_deref().and_then(read_beside);
         let (bytes, report) = match source {
-            Source::Splats(splats) => run(&compression, views, beside.as_ref(), &*splats, watch)?,
+            Source::Splats(splats) => run(&compression, views, beside.as_ref(), view, &*splats, watch)?,
             Source::File(given) => {
                 let (name, whole) = (given.name(), |bytes| compression.holds_whole(bytes, beside.is_some()));
                 with_source(given, &name, &options, whole, watch, &mut |source| {
-                    run(&compression, views.clone(), beside.as_ref(), source, watch)
+                    run(&compression, views.clone(), beside.as_ref(), view, source, watch)
                 })?
             }
         };
@@ -285,6 +289,7 @@ fn run(
     compression: &Compression,
     views: Option<Vec<CameraTuple>>,
     beside: Option<&(PathBuf, ViewSet)>,
+    view: FirstView,
     source: &dyn SplatSource,
     watch: &Watch,
 ) -> Result<(Vec<u8>, CompressionReport)> {
@@ -297,6 +302,34 @@ fn run(
     if let Some((_, set)) = beside {
         compression = compression.with_likely_cameras(set.clone().relative_to(offset).cameras);
     }
-    let report = compression.run(source, &mut file, watch)?;
+    let report = match view {
+        FirstView::Best => compression.run(source, &mut file, watch)?,
+        FirstView::Given(view) => compression.run(&WithView::new(source, view), &mut file, watch)?,
+    };
     Ok((file, report))
+}
+
+/// The choice of the view from which viewers show a scene first.
+#[derive(Clone, Copy)]
+enum FirstView {
+    /// The best of the cameras or of generated views.
+    Best,
+    /// This view, or none.
+    Given(Option<Pose>),
+}
+
+impl FirstView {
+    /// Returns the choice that `text` names: `auto`, a link of a viewer, or none.
+    fn of(text: Option<&str>) -> Result<Self> {
+        match text {
+            Some("auto") => Ok(Self::Best),
+            None => Ok(Self::Given(None)),
+            Some(link) => match Pose::from_link(link) {
+                Some(pose) => Ok(Self::Given(Some(pose))),
+                None => {
+                    Err(Error::parameter("view", link, "'auto', a link that a viewer copied, or None").into())
+                }
+            },
+        }
+    }
 }

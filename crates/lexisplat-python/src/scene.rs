@@ -107,6 +107,12 @@ impl Scene {
         Ok(self.reader(py)?.meta().offset.map(lexisplat::Offset::get))
     }
 
+    /// Returns the text of the view from which viewers show the scene first.
+    #[getter]
+    fn view(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        Ok(self.reader(py)?.meta().view.clone())
+    }
+
     /// Returns the report of the compression as JSON; `None` for a file that was opened.
     #[getter]
     fn report_json(&self) -> Option<&str> {
@@ -148,6 +154,7 @@ impl Scene {
                 "order_kept": reader.order_kept(),
                 "antialiased": reader.meta().antialiased,
                 "offset": reader.meta().offset,
+                "view": reader.meta().view,
                 "comments": reader.meta().comments,
                 "extras": reader.empty().geometry.extras.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(),
             }))

@@ -3,6 +3,7 @@
 use lexisplat::{Geometry, Model, SceneMeta, ShDegree, Splats};
 
 use crate::error::Result;
+use crate::pose::Pose;
 
 /// A scene to draw, borrowed.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +43,12 @@ impl<'a> Scene<'a> {
             Self::Dense(splats) => &splats.meta,
             Self::Sparse(model) => model.meta(),
         }
+    }
+
+    /// Returns the view that the file states, from which viewers show the scene first.
+    #[must_use]
+    pub fn first_view(&self) -> Option<Pose> {
+        self.meta().view.as_deref().and_then(Pose::parse)
     }
 
     /// Returns the SH degree.

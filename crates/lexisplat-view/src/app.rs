@@ -203,6 +203,7 @@ impl App {
             Err(error) => return self.show_error(error),
         };
         let bounds = SceneBounds::new(model.bulk, model.near, if given { &cameras } else { &[] });
+        self.state.set_first_view(model.scene.scene().first_view());
         self.state.set_cameras(cameras, given, bounds);
     }
 

@@ -1,9 +1,7 @@
 //! The free camera, which orbits a pivot, pans and flies.
 
 use glam::{DMat3, DVec3};
-use lexisplat_render::Camera;
-
-use crate::pose::Pose;
+use lexisplat_render::{Camera, Pose};
 
 /// Smallest angle between the view direction and the vertical, in radians.
 const POLE: f64 = 0.02;
@@ -44,6 +42,16 @@ impl SceneBounds {
         let mean = sum / f64::from(count.max(1));
         if mean.length() > 0.5 { mean.normalize() } else { DVec3::NEG_Y }
     }
+
+    /// Returns these bounds with an upward direction for which the view of `pose` is level. Among all such directions it
+    /// is the nearest to the axis of the world that is nearest to the view's own upward direction.
+    #[must_use]
+    pub fn upright_in(self, pose: &Pose) -> Self {
+        let [right, down, _] = pose.axes().map(DVec3::from_array);
+        let nearest = (0..3).max_by(|&a, &b| down[a].abs().total_cmp(&down[b].abs())).unwrap_or(1);
+        let axis = DVec3::AXES[nearest] * -down[nearest].signum();
+        Self { up: (axis - right * right.dot(axis)).normalize_or(self.up), ..self }
+    }
 }
 
 /// A camera that the user moves.
@@ -83,7 +91,7 @@ impl CameraController {
     /// Returns a controller that looks from `pose`, whose rotation need not be of length 1.
     #[must_use]
     pub fn from_pose(pose: &Pose, bounds: SceneBounds) -> Self {
-        let axes = pose.axes();
+        let axes = DMat3::from_cols_array_2d(&pose.axes());
         let position = DVec3::from_array(pose.position);
         Self { position, axes, distance: pose.distance, focal: pose.focal, near: bounds.near, bounds }
     }
@@ -91,7 +99,7 @@ impl CameraController {
     /// Returns the pose of the camera.
     #[must_use]
     pub fn pose(&self) -> Pose {
-        Pose::of(self.position, self.axes, self.distance, self.focal)
+        Pose::of(self.position.to_array(), self.axes.to_cols_array_2d(), self.distance, self.focal)
     }
 
     /// Returns the point that the camera orbits, in world units.
@@ -236,6 +244,20 @@ mod tests {
         assert_eq!((camera.position, camera.rotation[1]), ([0.0, 0.0, -5.0], [0.0, 1.0, 0.0]));
         // A narrow one shows as much in its width.
         assert!((controller().camera(100, 200).fx - 125.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_first_view_is_level() {
+        // A camera that looks down by 30 degrees, in worlds with other upward directions.
+        let (sine, cosine) = 30_f64.to_radians().sin_cos();
+        for turn in [DMat3::IDENTITY, DMat3::from_rotation_x(1.6), DMat3::from_rotation_z(-0.3)] {
+            let axes = turn
+                * DMat3::from_cols(DVec3::X, DVec3::new(0.0, cosine, -sine), DVec3::new(0.0, sine, cosine));
+            let pose = Pose::of([0.0; 3], axes.to_cols_array_2d(), 1.0, 1.0);
+            let up = BOUNDS.upright_in(&pose).up;
+            assert!(up.is_normalized() && axes.x_axis.dot(up).abs() < 1e-9);
+            assert!(near(up, (turn * DVec3::NEG_Y).to_array()) || up.dot(turn * DVec3::NEG_Y) > 0.99, "{up}");
+        }
     }
 
     #[test]

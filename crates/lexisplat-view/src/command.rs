@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use lexisplat::ShDegree;
 use lexisplat::packed::Preset;
-
-use crate::pose::Pose;
+use lexisplat_render::Pose;
 
 /// The place of one of the two models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -46,7 +46,7 @@
 //! | `command`, [`keys`], [`script`] | all commands; their keys; their words in scripts |
 //! | `state` | the shown scenes and the camera |
 //! | `camera_controller`, `gesture` | orbiting, panning and flying; the effect of mouse, fingers and held keys |
-//! | `pose`, `link` | the place and direction of the free camera as text; a link to exactly the view shown |
+//! | `link` | a link to exactly the view shown |
 //! | `picture`, `present`, `compose` | with `gpu`: one or two pictures on screen, or in memory |
 //! | `models` | with `window`: reading and compressing on threads of their own |
 //! | `scene_renderer`, `render_thread` | with `window`: drawing by the GPU or the CPU, and its thread |
@@ -74,7 +74,6 @@ mod options;
 mod panel;
 #[cfg(feature = "gpu")]
 mod picture;
-mod pose;
 #[cfg(feature = "gpu")]
 mod present;
 #[cfg(feature = "window")]
@@ -104,7 +103,6 @@ pub use glam::DVec3;
 pub use options::Options;
 #[cfg(feature = "gpu")]
 pub use picture::Picture;
-pub use pose::Pose;
 #[cfg(feature = "gpu")]
 pub use present::{Composition, Presenter};
 /// The words of a script and their meanings, for `--help`.

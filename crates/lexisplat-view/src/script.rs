@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use lexisplat::{Error, Result, ShDegree};
+use lexisplat_render::Pose;
 
 use crate::command::{Command, Mode, Quality, Slot};
 use crate::keys;
-use crate::pose::Pose;
 
 /// The words of a script and their meanings, for `--help`.
 pub const WORDS: &str = "\

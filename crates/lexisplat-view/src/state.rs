@@ -1,10 +1,9 @@
 //! The state of the view: the shown scenes and the camera. It is independent of windows.
 
-use lexisplat_render::{Camera, RenderOptions};
+use lexisplat_render::{Camera, Pose, RenderOptions};
 
 use crate::camera_controller::{CameraController, SceneBounds, fitted};
 use crate::command::{Command, Mode, Slot};
-use crate::pose::Pose;
 
 /// Initial amplification of differences, which is that of the montages of `lexisplat-eval`, and its range.
 const GAIN: f32 = 10.0;
@@ -37,6 +36,8 @@ pub struct State {
     /// Whether the cameras come from a file. Otherwise they are a generated orbit, whose picture size is arbitrary.
     given: bool,
     bounds: SceneBounds,
+    /// The view that the scene's file states. It is used if the cameras are not given.
+    first_view: Option<Pose>,
     /// Index of the camera chosen last.
     index: usize,
     /// Whether one of the cameras was chosen since the last reset.
@@ -62,6 +63,7 @@ impl State {
             cameras: Vec::new(),
             given: false,
             bounds,
+            first_view: None,
             index: 0,
             visited: false,
             free_camera: None,
@@ -72,12 +74,21 @@ impl State {
         }
     }
 
+    /// Sets the view that the scene's file states. [`Self::set_cameras`] shows it.
+    pub fn set_first_view(&mut self, view: Option<Pose>) {
+        self.first_view = view;
+    }
+
     /// Replaces the cameras and resets the view. With `given` cameras the view is that of the first camera. Otherwise it
-    /// is that of a free camera in the place of the first camera, whose picture fills the window.
+    /// is the view that the scene's file states, or that of a free camera in the place of the first camera, whose picture
+    /// fills the window.
     pub fn set_cameras(&mut self, cameras: Vec<Camera>, given: bool, bounds: SceneBounds) {
         self.cameras = cameras;
         self.given = given;
-        self.bounds = bounds;
+        self.bounds = match self.first_view.filter(|_| !given) {
+            Some(pose) => bounds.upright_in(&pose),
+            None => bounds,
+        };
         self.reset();
     }
 
@@ -102,9 +113,11 @@ impl State {
     fn reset(&mut self) {
         self.index = 0;
         self.visited = self.given;
-        self.free_camera = match self.cameras.first() {
-            Some(camera) if !self.given => Some(CameraController::at(camera, self.bounds)),
-            _ => None,
+        self.free_camera = match (self.first_view, self.cameras.first()) {
+            _ if self.given => None,
+            (Some(pose), Some(_)) => Some(CameraController::from_pose(&pose, self.bounds)),
+            (None, Some(camera)) => Some(CameraController::at(camera, self.bounds)),
+            (_, None) => None,
         };
     }
 

@@ -9,7 +9,7 @@ use lexisplat_compress::{Viewpoints, choose_layout};
 use lexisplat_render::Device;
 
 use super::part::Part;
-use super::values::{length, preset, real, size, viewpoints, whole};
+use super::values::{ViewChoice, first_view, length, preset, real, size, viewpoints, whole};
 
 /// Heading of the options that set the quality or the size of the file.
 const TARGET: &str = "Target, at most one of";
@@ -62,6 +62,10 @@ pub(crate) struct Compress {
     /// `auto` a search finds views like photographs [default: auto].
     #[arg(long, value_parser = viewpoints(), conflicts_with = "cameras")]
     pub(crate) views: Option<Viewpoints>,
+    /// View from which viewers show the scene first: a link that a viewer copied, its part after `view=`, or `none`
+    /// [default: the best of the cameras, or of generated views; with --guess none].
+    #[arg(long, value_name = "LINK", value_parser = first_view, allow_hyphen_values = true)]
+    pub(crate) view: Option<ViewChoice>,
     /// Keep the order of the source: store each Gaussian's index in the source, 1 to 3 bytes each. Without this option
     /// packed files have an order of their own.
     #[arg(long)]

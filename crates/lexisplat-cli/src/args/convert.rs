@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lexisplat::ShDegree;
 use lexisplat_formats::{Edits, Kind, WriteOptions};
 
-use super::values::{numbers, real, whole};
+use super::values::{ViewChoice, first_view, numbers, real, whole};
 
 /// Heading of the options that change the scene.
 const CHANGES: &str = "Changes, made in this order";
@@ -29,6 +29,10 @@ pub(crate) struct Convert {
     /// Format of the output [default: the format of its extension].
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     pub(crate) to: Option<Kind>,
+    /// View from which viewers show a .lexi first: a link that a viewer copied, its part after `view=`, or `none`. A
+    /// .lexi that is converted to a .lexi without changes keeps everything else as it is, and nothing is packed again.
+    #[arg(long, value_name = "LINK", value_parser = first_view, allow_hyphen_values = true)]
+    pub(crate) view: Option<ViewChoice>,
     /// Also draw the scene with its changes, and the file that was written, and print the PSNR of the file, over 8
     /// views like photographs, which a search finds.
     #[arg(long)]

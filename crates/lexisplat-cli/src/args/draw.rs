@@ -17,6 +17,10 @@ pub(crate) struct Render {
     /// Folder for the pictures [default: the scene's name with `-views` added].
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
+    /// Draw one picture instead, a PNG or a JPEG by its name, of the view from which viewers show the scene first.
+    /// It has 1280 x 720 pixels; --width makes it smaller.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "cameras", "orbit", "viewpoints", "budget"])]
+    pub(crate) poster: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) part: Part,
     /// Draw each view of a packed file with at most N Gaussians: near and visible chunks in full, the others from the

@@ -24,6 +24,7 @@ pub(crate) use self::draw::{Bench, Compare, Render};
 pub(crate) use self::eval::{Eval, Measures, Sweep};
 pub(crate) use self::html::Html;
 pub(crate) use self::part::Part;
+pub(crate) use self::values::ViewChoice;
 use self::values::whole;
 pub(crate) use self::views::Views;
 use crate::exit::AFTER_HELP;

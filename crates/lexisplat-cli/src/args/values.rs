@@ -6,6 +6,7 @@ use std::str::FromStr;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lexisplat::packed::Preset;
 use lexisplat_compress::{SplitFilter, Viewpoints};
+use lexisplat_render::Pose;
 use lexisplat_render::gpu::ShPath;
 
 /// Form of a size, for messages.
@@ -81,6 +82,33 @@ pub(super) fn size(text: &str) -> Result<u64, String> {
 pub(super) fn length(text: &str) -> Result<f32, String> {
     let length = text.trim().parse().ok().filter(|v: &f32| v.is_finite() && *v > 0.0);
     length.ok_or_else(|| "expected a length in the scene's units, above 0, such as 0.01".to_owned())
+}
+
+/// The choice of the view from which viewers show a scene first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum ViewChoice {
+    Of(Pose),
+    None,
+}
+
+impl ViewChoice {
+    /// Returns the view; `None` if the file is to have none.
+    pub(crate) fn pose(self) -> Option<Pose> {
+        match self {
+            Self::Of(pose) => Some(pose),
+            Self::None => None,
+        }
+    }
+}
+
+/// Parses a first view: `none`, the text of a pose, or a link of a viewer, which has this text after `view=`.
+pub(super) fn first_view(text: &str) -> Result<ViewChoice, String> {
+    if text == "none" {
+        return Ok(ViewChoice::None);
+    }
+    Pose::from_link(text)
+        .map(ViewChoice::Of)
+        .ok_or_else(|| "expected a link that a viewer copied, its part after view=, or none".to_owned())
 }
 
 /// Parses `N` finite numbers with commas between them.

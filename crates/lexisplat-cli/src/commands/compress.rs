@@ -13,8 +13,8 @@ use lexisplat::{
     SplatSource, lexi,
 };
 use lexisplat_compress::{
-    Compression, CompressionReport, Packing, Quality, SensitivitySource, Target, overshoot, read_beside,
-    uncertain_by,
+    Compression, CompressionReport, Packing, Quality, SensitivitySource, Target, WithView, overshoot,
+    read_beside, uncertain_by,
 };
 use lexisplat_eval::format;
 use lexisplat_formats::{Opened, open};
@@ -99,6 +99,8 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         let set = set.clone().relative_to(source.empty().meta.offset);
         compression = compression.with_likely_cameras(set.cameras);
     }
+    let viewed = args.view.map(|view| WithView::new(source, view.pose()));
+    let source = viewed.as_ref().map_or(source, |viewed| viewed as &dyn SplatSource);
     let open_seconds = start.elapsed().as_secs_f64();
     let mut report = write_output(&output, common.overwrite, |sink| {
         compression.run(source, sink, &bars).map_err(|error| match error {

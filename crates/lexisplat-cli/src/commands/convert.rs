@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Result;
+use lexisplat::lexi::{LexiReader, LexiWriter};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Input, Splats, unite};
 use lexisplat_compress::{Compression, DrawOptions, Packing, judging_views};
 use lexisplat_eval::{SceneFile, Whereabouts, compare, format};
-use lexisplat_formats::{Kind, Lost, merge, open, write};
+use lexisplat_formats::{Edits, Kind, Lost, merge, open, write};
 use lexisplat_render::{Device, Scene};
 use serde_json::{Value, json};
 
-use crate::args::{Common, Convert};
+use crate::args::{Common, Convert, ViewChoice};
 use crate::device::open_renderer;
 use crate::exit::Misuse;
 use crate::files::{check_output, input, is_pipe, siblings, tell, warn, write_output};
@@ -33,8 +34,22 @@ pub(crate) fn run(args: &Convert, common: &Common) -> Result<()> {
     check_output(output, &paths, common.overwrite)?;
     stop::while_writing(if is_pipe(output) { Work::Stream } else { Work::Files(1) });
     let bars = Bars::new(common.quiet);
+    let edits = args.edits()?;
+    if let ([input], Kind::Lexi, Some(view), true) = (inputs, kind, args.view, edits == Edits::default())
+        && let Some(bytes) = with_view(input, output, view, common, &bars)?
+    {
+        let json =
+            json!({ "output": output.display().to_string(), "format": kind.extension(), "bytes": bytes });
+        return tell(common, json, || {
+            Ok(format!("wrote {}: {} with another first view\n", output.display(), format::bytes(bytes)))
+        });
+    }
     let (mut splats, lost_extras, bytes_in) = read_all(inputs, args, common, &bars)?;
-    args.edits()?.apply(&mut splats)?;
+    edits.apply(&mut splats)?;
+    if let Some(view) = args.view {
+        // An empty text stands for no view.
+        splats.meta.view = Some(view.pose().map_or_else(String::new, |pose| pose.to_string()));
+    }
     let (bytes, mut lost) = write_output(output, common.overwrite, |sink| match kind {
         Kind::Lexi => {
             let report = Compression::from(Packing::default()).run(&splats, sink, &bars)?;
@@ -75,6 +90,29 @@ pub(crate) fn run(args: &Convert, common: &Common) -> Result<()> {
         }
         Ok(out)
     })
+}
+
+/// Writes the .lexi `path` with another first view to `output`. Returns the number of bytes; `None` for a file of another format.
+fn with_view(
+    path: &Path,
+    output: &Path,
+    view: ViewChoice,
+    common: &Common,
+    bars: &Bars,
+) -> Result<Option<u64>> {
+    let (name, bytes) = input(path, common)?;
+    if Kind::of(&name, &bytes) != Some(Kind::Lexi) {
+        return Ok(None);
+    }
+    let reader = LexiReader::open(&name, &bytes, &common.limits()?)?;
+    let view = view.pose().map(|pose| pose.to_string());
+    let write =
+        |writer: LexiWriter<'_>| write_output(output, common.overwrite, |sink| writer.write(sink, bars));
+    match reader.packed()? {
+        Some(packed) => write(LexiWriter::packed(&packed.with_view(view))),
+        None => write(LexiWriter::exact(&reader.model()?.with_view(view), reader.layout().codes())?),
+    }
+    .map(Some)
 }
 
 /// Returns the format to write: the format asked for, or the format of the output's extension.

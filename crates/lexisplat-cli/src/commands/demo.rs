@@ -14,6 +14,7 @@ use lexisplat_sweep::report::{CompressedFile, Picture, Report, jpeg, page};
 use serde_json::json;
 
 use super::compress::error_line;
+use super::first_view::FirstView;
 use super::html;
 use crate::args::{Common, Demo};
 use crate::files::{
@@ -152,8 +153,8 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
 /// Writes a page with a viewer and the file `packed_path`. `packed` is the decoded file.
 fn write_viewer(path: &Path, packed_path: &Path, packed: &Model, common: &Common) -> Result<()> {
     let (_, bytes) = input(packed_path, common)?;
-    let view = html::FirstView::new(&Scene::from(packed), "")?;
-    let still = view.still(&Scene::from(packed))?;
+    let view = FirstView::new(&Scene::from(packed), "")?;
+    let still = html::still(&view, &Scene::from(packed))?;
     let viewer = Page {
         title: "lexisplat demo",
         poster: Some(Poster { bytes: &still, kind: html::JPEG_TYPE }),

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use lexisplat::Error;
-use lexisplat_compress::ORBIT_SIZE;
 use lexisplat_eval::{SceneFile, format};
 use lexisplat_formats::{Kind, bundle};
-use lexisplat_render::{Scene, bulk, near_plane, orbit, render};
+use lexisplat_render::{Renderer, Scene};
 use lexisplat_sweep::report::jpeg;
-use lexisplat_view::{Command, SceneBounds, State, script};
+use lexisplat_view::script;
 use serde_json::json;
 
+use super::first_view::FirstView;
 use crate::args::{Common, Html};
 use crate::files::{check_output, input, is_pipe, output_path, siblings, tell, write_pieces};
 use crate::page::{Page, Poster};
@@ -23,8 +23,6 @@ const VIEWER: &str = "viewer.html";
 const STANDARD_INPUT_SCENE: &str = "scene.lexi";
 /// Name of the archive for a folder without a name.
 const BUNDLE: &str = "scene.sog";
-/// Number of views of the orbit. The first one is the still picture, like the first view of the viewer.
-const ORBIT: usize = 24;
 /// Width and height of the drawn still picture, in pixels. In wider windows the space to its left and right is empty.
 const POSTER_SIZE: (u32, u32) = (640, 360);
 /// First bytes of a PNG, and of a JPEG.
@@ -116,40 +114,9 @@ fn scene_name(path: &Path, file: &Path, is_bundled: bool) -> String {
     }
 }
 
-/// The first view of a page. The viewer would choose its view from the parts of a scene that arrive first, so the page
-/// states the view from which the still picture was drawn.
-pub(super) struct FirstView {
-    /// The given words, and a word for exactly this view.
-    pub(super) words: String,
-    state: State,
-}
-
-impl FirstView {
-    /// Returns the view of `scene` that a viewer has after `words`, which are words of a script.
-    pub(super) fn new(scene: &Scene<'_>, words: &str) -> Result<Self> {
-        let cameras = orbit(scene.geometry(), ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
-        let mut state = State::new([0.0; 3]);
-        state.set_open([true, false]);
-        let bounds = SceneBounds::new(bulk(scene.geometry()), near_plane(scene.geometry()), &[]);
-        state.set_cameras(cameras, false, bounds);
-        for command in script::parse(words)? {
-            state.apply(&command);
-        }
-        // A chosen camera becomes a free camera, whose picture fills the window.
-        let pose = state.free_camera().map(|camera| camera.pose());
-        let pose = pose.ok_or_else(|| anyhow::anyhow!("there is no view of the scene"))?;
-        state.apply(&Command::View(pose));
-        let view = format!("view={pose}");
-        let words = if words.trim().is_empty() { view } else { format!("{words},{view}") };
-        Ok(Self { words, state })
-    }
-
-    /// Returns a picture of `scene`, as a JPEG.
-    pub(super) fn still(&self, scene: &Scene<'_>) -> Result<Vec<u8>> {
-        let camera = self.state.camera(POSTER_SIZE.0, POSTER_SIZE.1);
-        let camera = camera.ok_or_else(|| anyhow::anyhow!("there is no view of the scene"))?;
-        Ok(jpeg(&render(scene, &camera, &self.state.options())?)?)
-    }
+/// Returns the still picture of `scene` for a page that begins with `view`, as a JPEG.
+pub(super) fn still(view: &FirstView, scene: &Scene<'_>) -> Result<Vec<u8>> {
+    Ok(jpeg(&view.picture(&mut Renderer::cpu(), scene, POSTER_SIZE)?)?)
 }
 
 /// Returns the bytes and the media type of the still picture.
@@ -168,7 +135,7 @@ fn poster(
         return Ok(Some((bytes.to_vec(), kind)));
     }
     match scene {
-        Some((scene, view)) if !args.no_poster => Ok(Some((view.still(&scene.scene())?, JPEG_TYPE))),
+        Some((scene, view)) if !args.no_poster => Ok(Some((still(view, &scene.scene())?, JPEG_TYPE))),
         _ => Ok(None),
     }
 }

@@ -10,6 +10,7 @@ mod decompress;
 mod demo;
 mod devices;
 mod eval;
+mod first_view;
 mod html;
 mod info;
 mod render;

@@ -7,17 +7,22 @@ use anyhow::Result;
 use lexisplat::lexi::{FeedOptions, LexiFeed, StreamedScene};
 use lexisplat::packed::{Budget, Eye};
 use lexisplat::{Error, FormatError, Progress};
+use lexisplat_eval::SceneFile;
 use lexisplat_render::{Camera, Image, Prepared, RenderOptions, Renderer, Scene};
+use lexisplat_sweep::report::jpeg;
 use serde_json::{Map, Value, json};
 
+use super::first_view::FirstView;
 use crate::args::{Common, Render};
 use crate::device::open_renderer;
 use crate::files::{
-    check_free, input, is_pipe, load_part, make_folder, tell, view_name, warn_of, write_picture,
+    check_free, input, is_pipe, load_part, make_folder, tell, view_name, warn_of, write_bytes, write_picture,
 };
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
+/// Width and height of a poster, in pixels.
+const POSTER_SIZE: (u32, u32) = (1280, 720);
 /// Folder for the pictures of standard input.
 const STANDARD_INPUT_VIEWS: &str = "stdin-views";
 
@@ -28,6 +33,9 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     let input = load_part(&args.file, &args.part, common)?;
     warn_of(&input);
     let scene = input.scene();
+    if let Some(path) = &args.poster {
+        return poster(args, path, &input, common);
+    }
     let cameras = super::cameras(&args.views, &scene)?;
     let pictures = Pictures::new(args, common, &input.name, cameras)?;
     let mut renderer = open_renderer(args.views.device)?;
@@ -35,6 +43,41 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     let options = RenderOptions::default().with_background(args.views.background);
     pictures.draw(&mut renderer, &mut |renderer, camera| {
         Ok((timed(renderer, &prepared, camera, &options)?, Map::new()))
+    })
+}
+
+/// Draws the view from which viewers show the scene first.
+fn poster(args: &Render, path: &Path, input: &SceneFile, common: &Common) -> Result<()> {
+    check_free(path, &[], common.overwrite)?;
+    stop::while_writing(Work::Files(1));
+    let scene = input.scene();
+    if scene.is_empty() {
+        return Err(
+            Error::parameter("scene", "no Gaussians", "one or more, or there is nothing to draw").into()
+        );
+    }
+    let [r, g, b] = args.views.background;
+    let view = FirstView::new(&scene, &format!("background={r}:{g}:{b}"))?;
+    let camera = view.camera(POSTER_SIZE)?.with_max_width(args.views.width).with_near(args.views.near);
+    let mut renderer = open_renderer(args.views.device)?;
+    let prepared = renderer.prepare(scene)?;
+    let (picture, seconds) = timed(&mut renderer, &prepared, &camera, &view.options())?;
+    let end = path.extension().unwrap_or_default().to_ascii_lowercase();
+    match end == "jpg" || end == "jpeg" {
+        true => write_bytes(path, &jpeg(&picture)?, common.overwrite)?,
+        false => write_picture(path, &picture, common.overwrite)?,
+    }
+    let json = json!({
+        "scene": input.name,
+        "file": path.display().to_string(),
+        "width": picture.width,
+        "height": picture.height,
+        "view": view.pose,
+        "stated": scene.first_view().is_some(),
+        "milliseconds": seconds * 1000.0,
+    });
+    tell(common, json, || {
+        Ok(format!("wrote {}: {} x {} pixels\n", path.display(), picture.width, picture.height))
     })
 }
 

@@ -35,7 +35,7 @@ def _seed(name: str, value: object) -> int:
 
 #: What each option of :func:`compress` that the native part has may be, but for cameras.
 _OPTIONS: dict[str, Callable[[str, Any], object]] = {
-    **dict.fromkeys(["preset", "pursuit", "views", "layout"], text),
+    **dict.fromkeys(["preset", "pursuit", "views", "view", "layout"], text),
     **dict.fromkeys(["psnr", "min_psnr", "ratio", "tol"], number),
     **dict.fromkeys(["size", "memory"], bytes_of),
     **dict.fromkeys(["atoms", "sample", "max_gaussians"], count),
@@ -68,6 +68,7 @@ def compress(
     tol: float | None = None,
     cameras: Cameras | None = "auto",
     views: Literal["auto", "object", "room"] | None = None,
+    view: str | None = "auto",
     layout: Layout | None = None,
     atoms: int | None = None,
     pursuit: Literal["omp", "ols"] | None = None,
@@ -111,6 +112,9 @@ def compress(
         ``sparse/0``. Otherwise, and with ``None``, views like photographs are looked for.
     views : {"auto", "object", "room"}, optional
         Where generated views are taken from.
+    view : "auto" or str, optional
+        The view from which viewers show the scene first: a link that a viewer copied, or its part after ``view=``. With
+        ``"auto"`` it is the best of the cameras, or of generated views; with ``guess`` there is none.
     layout : {"packed", "f16", "f32", "paper"}, optional
         ``"packed"`` quantises and entropy-codes everything. The others keep geometry exactly.
     atoms : int, optional

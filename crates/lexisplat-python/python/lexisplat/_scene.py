@@ -92,6 +92,11 @@ class Scene:
         return self._native.layout
 
     @property
+    def view(self) -> str | None:
+        """The view from which viewers show the scene first, as the text of their links."""
+        return self._native.view
+
+    @property
     def offset(self) -> npt.NDArray[np.float64] | None:
         """What is added to positions to get to the world of the source, (3,); see :class:`Splats`."""
         offset = self._native.offset

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use lexisplat::Geometry;
 use lexisplat_render::gpu::ScenePart;
-use lexisplat_render::{Camera, bulk, near_plane, orbit};
+use lexisplat_render::{Camera, Pose, bulk, near_plane, orbit};
 use lexisplat_view::{DVec3, SceneBounds, Slot};
 
 /// Number of Gaussians of each part that are remembered.
@@ -36,12 +36,14 @@ pub(super) struct Bounds {
     found_at: usize,
     /// Link to the view that was last chosen for the scene, until the user changes the view.
     pub(super) link: Option<String>,
+    /// The view that the scene's file states.
+    pub(super) first_view: Option<Pose>,
 }
 
 impl Bounds {
     /// Begins with the scene in `slot`, which will have `wanted` Gaussians.
-    pub(super) fn begin(&mut self, slot: Slot, wanted: u64) {
-        *self = Self { slot: Some(slot), wanted, link: self.link.take(), ..Self::default() };
+    pub(super) fn begin(&mut self, slot: Slot, wanted: u64, first_view: Option<Pose>) {
+        *self = Self { slot: Some(slot), wanted, first_view, link: self.link.take(), ..Self::default() };
     }
 
     /// Takes a part of the scene in `slot`. Returns whether the bounds should be found again. Parts that come when all wanted

@@ -6,7 +6,7 @@ mod screen;
 use js_sys::{Object, Reflect, Uint8Array};
 use lexisplat::packed::Eye;
 use lexisplat_render::gpu::{SceneForm, ScenePart};
-use lexisplat_render::read_cameras_bytes;
+use lexisplat_render::{Pose, read_cameras_bytes};
 use lexisplat_view::{Command, DVec3, Mode, Slot, State, keys, script};
 use serde_json::{Value, json};
 use wasm_bindgen::prelude::*;
@@ -155,7 +155,7 @@ impl Viewer {
     }
 
     /// Begins a scene in a slot, 0 or 1, and replaces the scene in this slot. `info` is a JSON object that the report
-    /// returns. Its `shown` is the number of Gaussians that will come.
+    /// returns. Its `shown` is the number of Gaussians that will come, its `view` the text of the first view if there is one.
     ///
     /// # Errors
     /// An error if the bytes are not from [`Chunk.form`](crate::Chunk::form), or if the GPU refuses.
@@ -165,12 +165,13 @@ impl Viewer {
         let info: Value = serde_json::from_str(&info).map_err(thrown)?;
         self.screen.begin(slot, &form).await.map_err(thrown)?;
         let wanted = info["shown"].as_u64().unwrap_or(0);
+        let first_view = info["view"].as_str().and_then(Pose::parse);
         self.infos[slot.index()] = Some(info);
         let was_open = self.infos.iter().flatten().count() > 1 || slot == Slot::Second;
         self.state.set_open([0, 1].map(|k| self.infos[k].is_some()));
         // The view is set for a scene that is alone or is a new first scene.
         if !was_open || slot == Slot::First {
-            self.bounds.begin(slot, wanted);
+            self.bounds.begin(slot, wanted, first_view);
         }
         self.drawn = None;
         Ok(())
@@ -209,6 +210,7 @@ impl Viewer {
         let before = self.state.link();
         let is_untouched = self.bounds.link.as_ref().is_none_or(|link| link == &before);
         let (cameras, bounds) = self.bounds.around();
+        self.state.set_first_view(self.bounds.first_view);
         self.state.set_cameras(cameras, false, bounds);
         if is_untouched {
             self.bounds.link = Some(self.state.link());

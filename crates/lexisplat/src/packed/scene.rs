@@ -132,6 +132,13 @@ impl Packed {
         self
     }
 
+    /// Replaces the view from which viewers show the scene first; see [`SceneMeta::view`](crate::SceneMeta::view).
+    #[must_use]
+    pub fn with_view(mut self, view: Option<String>) -> Self {
+        self.head.meta.view = view;
+        self
+    }
+
     /// Replaces the limits on the decoded scene.
     #[must_use]
     pub fn with_limits(mut self, limits: Limits) -> Self {

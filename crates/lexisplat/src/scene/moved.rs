@@ -7,15 +7,16 @@ use crate::support::error::{Error, Result};
 
 impl Splats {
     /// Makes positions relative to `offset` instead of the scene's own offset. Every Gaussian stays at its place, except for
-    /// rounding. Returns the rounding.
+    /// rounding. A first view is removed unless the offset is the same. Returns the rounding.
     pub fn rebase(&mut self, offset: Option<Offset>) -> Rounding {
         let error = shift(&mut self.geometry.positions, self.meta.offset, offset);
+        self.meta.view = self.meta.view.take().filter(|_| self.meta.offset == offset);
         self.meta.offset = offset;
         Rounding { error, size: self.median_size() }
     }
 
     /// Moves every Gaussian by `by`. The positions change if single precision can hold the result. If rounding would be
-    /// [coarse](Rounding::is_coarse), positions stay as they are and the offset changes.
+    /// [coarse](Rounding::is_coarse), positions stay as they are and the offset changes. A first view is removed.
     ///
     /// # Errors
     /// [`Error::Parameter`] for numbers that are not finite, and for positions that leave single precision.
@@ -28,6 +29,7 @@ impl Splats {
         if let Some(value) = moved.as_flattened().iter().find(|v| !v.is_finite()) {
             return Err(Error::parameter("position", value, "finite positions after all changes"));
         }
+        self.meta.view = None;
         if rounding.is_coarse() {
             self.meta.offset = offset;
         } else {

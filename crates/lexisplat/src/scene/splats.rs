@@ -66,11 +66,15 @@ pub struct SceneMeta {
     pub antialiased: bool,
     /// The numbers that are added to positions to get the positions of the source; `None` if these are the same.
     pub offset: Option<Offset>,
+    /// Text of the view from which viewers show the scene first: `Pose` of `lexisplat-render`. PLY files have none.
+    /// Viewers ignore a text that they cannot read. An empty text stands for a file without a view.
+    pub view: Option<String>,
 }
 
 impl SceneMeta {
-    /// Adds the comments of `other` that are not there yet.
+    /// Adds the comments of `other` that are not there yet, and its view if there is none.
     pub(crate) fn join(&mut self, other: &Self) {
+        self.view = self.view.take().or_else(|| other.view.clone());
         for comment in &other.comments {
             if !self.comments.contains(comment) {
                 self.comments.push(comment.clone());

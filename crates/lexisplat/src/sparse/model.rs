@@ -146,6 +146,7 @@ impl Model {
     /// Makes positions relative to `offset`, as [`Splats::rebase`] does.
     pub fn rebase(&mut self, offset: Option<Offset>) {
         shift(&mut self.geometry.positions, self.meta.offset, offset);
+        self.meta.view = self.meta.view.take().filter(|_| self.meta.offset == offset);
         self.meta.offset = offset;
     }
 
@@ -165,6 +166,13 @@ impl Model {
     #[must_use]
     pub fn record(&self) -> &Record {
         &self.record
+    }
+
+    /// Replaces the first view; see [`SceneMeta::view`].
+    #[must_use]
+    pub fn with_view(mut self, view: Option<String>) -> Self {
+        self.meta.view = view;
+        self
     }
 
     /// Returns the fields that [`Self::new`] takes, in its order.

@@ -69,6 +69,8 @@ struct Facts<'a> {
     antialiased: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     offset: Option<Offset>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    view: Option<&'a str>,
     comments: &'a [String],
     extras: Vec<&'a str>,
     statistics: &'a Lint,
@@ -101,6 +103,7 @@ impl<'a> Facts<'a> {
             sh_degree: like.degree.get(),
             antialiased: like.meta.antialiased,
             offset: like.meta.offset,
+            view: like.meta.view.as_deref(),
             comments: &like.meta.comments,
             extras: like.geometry.extras.iter().map(|e| e.name.as_str()).collect(),
             statistics,

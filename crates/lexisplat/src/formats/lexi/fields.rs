@@ -53,6 +53,7 @@ pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
         comments,
         antialiased: checked.number_or_default(key::ANTIALIASED)?,
         offset: offset(checked)?,
+        view: checked.text(key::VIEW).ok().map(str::to_owned),
     })
 }
 

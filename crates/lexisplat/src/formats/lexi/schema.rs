@@ -79,6 +79,7 @@ pub(super) mod key {
     pub(crate) const ANTIALIASED: &str = "antialiased";
     pub(crate) const COMMENTS: &str = "comments";
     pub(crate) const OFFSET: &str = "offset";
+    pub(crate) const VIEW: &str = "view";
     pub(crate) const GAUSSIANS: &str = "gaussians";
     pub(crate) const REMOVED: &str = "removed";
     pub(crate) const TARGET: &str = "target";

@@ -113,6 +113,7 @@ impl<'a> LexiWriter<'a> {
         metadata.extend(head.meta.antialiased.then(|| (key::ANTIALIASED, "true".to_owned())));
         metadata.extend((!head.meta.comments.is_empty()).then(|| (key::COMMENTS, json(&head.meta.comments))));
         metadata.extend(head.meta.offset.map(|offset| (key::OFFSET, json(&offset))));
+        metadata.extend(view(&head.meta));
         metadata.extend(tolerance.map(|tolerance| (key::TOLERANCE, tolerance.to_string())));
         metadata.extend([(key::GAUSSIANS, head.gaussians.to_string())]);
         metadata.extend((head.removed > 0).then(|| (key::REMOVED, head.removed.to_string())));
@@ -192,6 +193,11 @@ fn coded_layers(ty: ScalarType, layers: Vec<(usize, Spilled)>) -> Result<Vec<u8>
     Ok(out)
 }
 
+/// Returns the entry of the first view. An empty text stands for no view.
+fn view(meta: &SceneMeta) -> Option<(&'static str, String)> {
+    meta.view.clone().filter(|view| !view.is_empty()).map(|view| (key::VIEW, view))
+}
+
 /// Returns the metadata of an exact file.
 fn scene_metadata(layout: Layout, degree: ShDegree, record: &Record, meta: &SceneMeta) -> Metadata {
     let mut metadata = preamble(FORMAT, VERSION);
@@ -208,6 +214,7 @@ fn scene_metadata(layout: Layout, degree: ShDegree, record: &Record, meta: &Scen
         (key::COMMENTS, json(&meta.comments)),
     ]);
     metadata.extend(meta.offset.map(|offset| (key::OFFSET, json(&offset))));
+    metadata.extend(view(meta));
     metadata.extend(record.tolerance.map(|tolerance| (key::TOLERANCE, tolerance.to_string())));
     metadata.extend(record.max_nonzeros.map(|cap| (key::MAX_NONZEROS, cap.to_string())));
     metadata

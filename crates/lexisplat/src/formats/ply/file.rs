@@ -55,7 +55,8 @@ impl<'a> PlyFile<'a> {
         if count == 0 {
             warnings.push("the scene holds no Gaussians".to_owned());
         }
-        let meta = SceneMeta { comments: header.comments, antialiased: marks.antialiased, offset: None };
+        let meta =
+            SceneMeta { comments: header.comments, antialiased: marks.antialiased, ..SceneMeta::default() };
         let looks_at_positions = layout.groups[POSITIONS].is_finer_than_f32();
         let limits = options.limits;
         Ok(Self { name, rows, layout, count, meta, warnings, summary, looks_at_positions, limits })

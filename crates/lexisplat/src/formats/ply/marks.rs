@@ -44,7 +44,7 @@ pub(super) fn marks<S: AsRef<str>>(comments: &[S]) -> Marks {
 #[must_use]
 pub fn meta_of(comments: Vec<String>) -> SceneMeta {
     let antialiased = marks(&comments).antialiased;
-    SceneMeta { comments, antialiased, offset: None }
+    SceneMeta { comments, antialiased, ..SceneMeta::default() }
 }
 
 #[cfg(test)]

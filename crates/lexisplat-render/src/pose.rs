@@ -1,8 +1,10 @@
-//! The pose of the free camera, and its text in links and scripts.
+//! The pose of a camera, and its text in files, links and scripts.
 
 use std::fmt;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat};
+
+use crate::camera::Camera;
 
 /// Number of decimals of a quaternion's components. Half a unit of the last decimal turns the view by less than 2e-7
 /// radians, below 1/500 of a pixel of a picture 4000 pixels wide.
@@ -26,7 +28,7 @@ const NUMBERS: usize = 9;
 /// Word after the numbers of a mirrored camera.
 const MIRRORED: &str = "mirrored";
 
-/// The pose of a free camera: its place, direction, pivot and focal length.
+/// The pose of a camera: its place, direction, pivot and focal length.
 ///
 /// Its text is `X:Y:Z:I:J:K:W:DISTANCE:FOCAL`, followed by `:mirrored` for a mirrored camera. Positions are rounded to
 /// 1e-7 of the distance or finer, the quaternion to 7 decimals, distance and focal length to 8 digits. The text of a pose
@@ -46,16 +48,38 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Returns the pose with these axes: right, down and forward in the world, as orthonormal columns.
-    pub(crate) fn of(position: DVec3, axes: DMat3, distance: f64, focal: f64) -> Self {
+    /// Returns the pose with these axes: the directions right, down and forward in the world, which are orthonormal.
+    #[must_use]
+    pub fn of(position: [f64; 3], axes: [[f64; 3]; 3], distance: f64, focal: f64) -> Self {
+        let axes = DMat3::from_cols_array_2d(&axes);
         let mirrored = axes.determinant() < 0.0;
         let rotation = DQuat::from_mat3(&handed(axes, mirrored)).to_array();
-        Self { position: position.to_array(), rotation, mirrored, distance, focal }
+        Self { position, rotation, mirrored, distance, focal }
     }
 
-    /// Returns the right, down and forward directions in the world, as columns.
-    pub(crate) fn axes(&self) -> DMat3 {
-        handed(DMat3::from_quat(DQuat::from_array(self.rotation).normalize()), self.mirrored)
+    /// Returns the pose of `camera`, whose pivot is at this distance.
+    #[must_use]
+    pub fn of_camera(camera: &Camera, distance: f64) -> Self {
+        let axes = DMat3::from_cols_array_2d(&camera.rotation.map(|row| row.map(f64::from))).transpose();
+        let short = f64::from(camera.width.min(camera.height).max(1));
+        let position = camera.position.map(f64::from);
+        Self::of(position, axes.to_cols_array_2d(), distance, f64::from(camera.fy) / short)
+    }
+
+    /// Returns the camera of this pose for a picture of this width and height, whose near plane is at distance `near`.
+    #[must_use]
+    pub fn camera(&self, size: [u32; 2], near: f32) -> Camera {
+        let focal = self.focal * f64::from(size[0].min(size[1]));
+        let axes = self.axes();
+        let rotation = [0, 1, 2].map(|row| axes.map(|axis| axis[row]));
+        Camera::rounded("first view".to_owned(), size, [focal; 2], self.position, rotation).with_near(near)
+    }
+
+    /// Returns the directions right, down and forward in the world.
+    #[must_use]
+    pub fn axes(&self) -> [[f64; 3]; 3] {
+        let rotation = DQuat::from_array(self.rotation).normalize();
+        handed(DMat3::from_quat(rotation), self.mirrored).to_cols_array_2d()
     }
 
     /// Returns the pose of a text. Returns `None` if a number is missing, is not finite or gives no picture in single
@@ -77,6 +101,13 @@ impl Pose {
         let is_drawn = lengths.contains(&distance) && FOCALS.contains(&focal);
         let rotation = DQuat::from_array(rotation).normalize().to_array();
         (is_placed && is_turned && is_drawn).then_some(Self { position, rotation, mirrored, distance, focal })
+    }
+
+    /// Returns the pose of a link that a viewer copied, which has the text after `view=`, or of the text alone.
+    #[must_use]
+    pub fn from_link(link: &str) -> Option<Self> {
+        let text = link.rsplit_once("view=").map_or(link, |(_, text)| text);
+        text.split(['&', ',']).next().and_then(Self::parse)
     }
 }
 
@@ -134,18 +165,33 @@ fn settled(rotation: [f64; 4]) -> [f64; 4] {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
     use proptest::prelude::*;
 
     use super::*;
 
     #[test]
     fn a_text_is_short_and_readable() {
-        let turned = DMat3::from_cols(DVec3::NEG_X, DVec3::Y, DVec3::NEG_Z);
-        let pose = Pose::of(DVec3::new(1.5, -0.25, 1.0 / 3.0), turned, 4.0, 0.9);
+        let turned = [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
+        let pose = Pose::of([1.5, -0.25, 1.0 / 3.0], turned, 4.0, 0.9);
         assert_eq!(pose.to_string(), "1.5:-0.25:0.3333333:0:1:0:0:4:0.9");
         let mirrored = Pose { mirrored: true, ..pose };
         assert_eq!(Pose::parse(&mirrored.to_string()).unwrap().to_string(), mirrored.to_string());
-        assert_eq!(mirrored.axes().determinant(), -1.0);
+        assert_eq!(mirrored.axes()[0], [1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_link_has_a_pose() {
+        let text = "1.5:-0.25:0:0:1:0:0:4:0.9";
+        let pose = Pose::parse(text);
+        assert!(pose.is_some());
+        for link in [text, &format!("view={text}"), &format!("https://a.b/?budget=3#view={text}&mode=first")]
+        {
+            assert_eq!(Pose::from_link(link), pose, "{link}");
+        }
+        for bad in ["", "view=", "1:2:3", "camera=4"] {
+            assert_eq!(Pose::from_link(bad), None, "{bad}");
+        }
     }
 
     #[test]
@@ -201,13 +247,13 @@ mod tests {
             let (scale, distance) = (10_f64.powf(exponent), 10_f64.powf(exponent) * 3.7);
             let axes = handed(DMat3::from_axis_angle(axis, angle), mirrored);
             let position = DVec3::from_array(position) * scale;
-            let pose = Pose::of(position, axes, distance, focal);
+            let pose = Pose::of(position.to_array(), axes.to_cols_array_2d(), distance, focal);
             let text = pose.to_string();
             let read = Pose::parse(&text).unwrap();
-            let again = Pose::of(DVec3::from_array(read.position), read.axes(), read.distance, read.focal);
+            let again = Pose::of(read.position, read.axes(), read.distance, read.focal);
             prop_assert_eq!(again.to_string(), text);
             prop_assert!((DVec3::from_array(read.position) - position).length() <= 1e-7 * distance);
-            for (got, want) in read.axes().to_cols_array().into_iter().zip(axes.to_cols_array()) {
+            for (got, want) in read.axes().as_flattened().iter().zip(axes.to_cols_array()) {
                 prop_assert!((got - want).abs() < 1e-6);
             }
             prop_assert!((read.distance / distance - 1.0).abs() < 1e-7 && (read.focal / focal - 1.0).abs() < 1e-7);
