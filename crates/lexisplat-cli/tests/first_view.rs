@@ -26,7 +26,8 @@ fn a_file_states_the_best_view_or_the_one_that_is_given() {
     folder.run(&["compress", "scene.ply", "-o", "exact.lexi", "--tol", "0.2", "--quiet"]);
     assert!(stated(&folder, "exact.lexi").is_some());
     for layout in ["packed", "f16"] {
-        let given = ["compress", "scene.ply", "-o", "given.lexi", "--layout", layout, "--overwrite", "--quiet"];
+        let given =
+            ["compress", "scene.ply", "-o", "given.lexi", "--layout", layout, "--overwrite", "--quiet"];
         folder.run(&[&given[..], &["--view", &format!("https://a.b/#view={VIEW}&mode=first")]].concat());
         assert_eq!(stated(&folder, "given.lexi").as_deref(), Some(VIEW));
         folder.run(&[&given[..], &["--view", "none"]].concat());
@@ -77,6 +78,7 @@ fn posters_and_pages_begin_with_the_view() {
         assert!(picture.pixels().any(|pixel| pixel.0 != [0; 3]), "{file} shows the scene");
     }
     folder.fail(&[&draw[..], &["--poster", "a.png"]].concat(), 7);
-    let report = folder.json(&["render", "scene.ply", "--device", "cpu", "--width", "16", "--poster", "c.png"]);
+    let report =
+        folder.json(&["render", "scene.ply", "--device", "cpu", "--width", "16", "--poster", "c.png"]);
     assert_eq!(report["stated"], false);
 }

@@ -31,6 +31,9 @@ const SHARES: [f64; 2] = [0.01, 0.6];
 /// reach. Views through haze have less.
 const LEAST_DETAIL: f64 = 0.7;
 const DETAILED: f64 = 0.15;
+/// Range of the sine of the angle by which generated views look up: 58 degrees down to 20 degrees up. Few photographs are taken
+/// from below or straight from above.
+const LOOKS_UP: std::ops::RangeInclusive<f64> = -0.85..=0.35;
 /// Share of the picture, from its middle, in which the subject counts as in the picture.
 const WITHIN: f32 = 0.9;
 /// Radius around the subject's centre, as a share of the subject's radius, within which Gaussians belong to it.
@@ -71,8 +74,13 @@ pub(crate) fn first_view(
         }
         None => {
             let up = upward(&splats.geometry);
-            let level =
-                |cameras: Vec<Camera>| cameras.into_iter().map(|camera| levelled(camera, up)).collect();
+            let level = |cameras: Vec<Camera>| -> Vec<Camera> {
+                let usual = cameras.into_iter().filter(|camera| {
+                    let sine: f64 = (0..3).map(|k| f64::from(camera.rotation[k][2]) * up[k]).sum();
+                    LOOKS_UP.contains(&sine)
+                });
+                usual.map(|camera| levelled(camera, up)).collect()
+            };
             let [width, height] = GENERATED_SIZE;
             let ring = drawn(level(object(&splats.geometry, RING, width, height)))?;
             if quantile(ring.iter().map(|view| view.lit), 0.5) < BARE {
