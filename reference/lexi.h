@@ -52,7 +52,7 @@ typedef struct lexi_limits {
    itself opens a first part, and sets `bytes` (of `length`) as they come in, in any order. They have to stay there. */
 typedef struct lexi_range {
     int what, number;            /* LEXI_BASE; LEXI_FINER 1 to 2; LEXI_PART 0 to 2; LEXI_INTERIM */
-    uint64_t start;              /* place in the file */
+    uint64_t start;              /* offset in the file */
     uint32_t length, crc, integers_crc;
     const unsigned char *bytes;
 } lexi_range;
@@ -98,7 +98,7 @@ typedef struct lexi_scene {
     float *normal;               /* 3 a row; NULL if the file has none */
     int d;
     float *sh_rest;              /* LEXI_DENSE: d a row */
-    size_t *code_first;          /* LEXI_SPARSE: the first of a Gaussian's places in `atom` and `value`, ... */
+    size_t *code_first;          /* LEXI_SPARSE: the first of a Gaussian's entries in `atom` and `value`, ... */
     uint8_t *code_count;         /* ... and their number; or LEXI_EXACT, code_first is then a row of exact_rows */
     size_t code_total, exact_total;
     uint16_t *atom;              /* ascending within a Gaussian */
@@ -576,7 +576,7 @@ static int lexi__number(lexi__call *call, lexi__text t, double *x) {
 typedef struct {
     lexi__text name;
     int type, rank, known;
-    uint64_t shape[2], count, begin, end; /* the first two numbers of the shape; elements; places behind the header */
+    uint64_t shape[2], count, begin, end; /* the first two numbers of the shape; elements; offsets behind the header */
 } lexi__tensor;
 
 typedef struct {
@@ -1925,13 +1925,13 @@ static int lexi__evaluate(lexi__work *x, const lexi__gaussian *g, int lack, int 
     rotation[3] = (float)(g->needle ? (Z - W - X + Y) / 2 : Z);
     for (int k = 0; k < 3; k++) moves[k] = lexi__multiply(H, g->count[7 + k]) * exp2(g->move_log[k] / 512.0);
     for (int n = 0; n < 3; n++) {
-        double place = h->origin[n] + (g->cell[n] + 0.5) * h->side;
+        double coordinate = h->origin[n] + (g->cell[n] + 0.5) * h->side;
         dc[n] = h->dc_mean[n];
         for (int k = 0; k < 3; k++) {
-            place += moves[k] * axes[k][n];
+            coordinate += moves[k] * axes[k][n];
             dc[n] += values[4 + k] * h->dc_unit * h->dc_axes[k][n];
         }
-        position[n] = lexi__round(place);
+        position[n] = lexi__round(coordinate);
         if (!lexi__finite(position[n])) return lexi__range_refuse(x, "a position is not finite");
     }
     return 1;
@@ -2050,17 +2050,17 @@ static int lexi__packed_sh(lexi__work *x, const lexi__gaussian *g, int parts, si
     }
     for (int p = 0; p < parts && !g->exact; p++)
         for (int k = 0; k < g->nonzeros[p]; k++, used[p]++) {
-            int place = n++;
+            int slot = n++;
             uint16_t atom = x->atoms[p][used[p]];
             float product = (float)x->sizes[p][used[p]] * step;
-            for (; place > 0 && atoms[place - 1] >= atom; place--) {
-                if (atoms[place - 1] == atom) return lexi__range_fail(x, "a Gaussian has atom % twice", atom, 0);
-                atoms[place] = atoms[place - 1];
-                values[place] = values[place - 1];
+            for (; slot > 0 && atoms[slot - 1] >= atom; slot--) {
+                if (atoms[slot - 1] == atom) return lexi__range_fail(x, "a Gaussian has atom % twice", atom, 0);
+                atoms[slot] = atoms[slot - 1];
+                values[slot] = values[slot - 1];
             }
-            atoms[place] = atom;
-            values[place] = lexi__to_half(product);
-            if (!lexi__finite(values[place])) return lexi__range_refuse(x, "an SH value is not finite in f16");
+            atoms[slot] = atom;
+            values[slot] = lexi__to_half(product);
+            if (!lexi__finite(values[slot])) return lexi__range_refuse(x, "an SH value is not finite in f16");
         }
     for (int k = 0; k < n; k++) lexi__add_atom(sh_rest, f->dictionary + (size_t)atoms[k] * (size_t)d, values[k], d);
     for (int k = 0; k < d; k++)
@@ -2368,7 +2368,7 @@ static int lexi__numbers(lexi__cursor *c, unsigned char *out, unsigned char *pla
 }
 
 static int lexi__block(lexi__cursor *c, unsigned char *out, unsigned char *planes, unsigned char *palette,
-                       unsigned char *places, size_t n, size_t w) {
+                       unsigned char *indices, size_t n, size_t w) {
     uint32_t filter = c->p < c->end ? c->p[0] : 255;
     if (filter && filter != 4) return lexi__numbers(c, out, planes, n, w);
     c->p++;
@@ -2379,12 +2379,12 @@ static int lexi__block(lexi__cursor *c, unsigned char *out, unsigned char *plane
     }
     size_t colours = lexi__fixed(c, "a palette", 2) + 1, size = colours <= 256 ? 1 : 2;
     if (colours > n) lexi__bad(c, "a palette", "has more values than the block has rows");
-    if (c->why || !lexi__numbers(c, palette, planes, colours, w) || !lexi__numbers(c, places, planes, n, size))
+    if (c->why || !lexi__numbers(c, palette, planes, colours, w) || !lexi__numbers(c, indices, planes, n, size))
         return 0;
     for (size_t i = 0; i < n; i++) {
-        size_t place = size == 1 ? places[i] : lexi__u16(places + 2 * i);
-        if (place >= colours) { lexi__bad(c, "a palette", "has no value for a row"); return 0; }
-        memcpy(out + i * w, palette + place * w, w);
+        size_t index = size == 1 ? indices[i] : lexi__u16(indices + 2 * i);
+        if (index >= colours) { lexi__bad(c, "a palette", "has no value for a row"); return 0; }
+        memcpy(out + i * w, palette + index * w, w);
     }
     return 1;
 }
@@ -2447,7 +2447,7 @@ void lexi_free_extra(lexi_extra *extra) {
     memset(extra, 0, sizeof *extra);
 }
 
-/* Move row k of n to place order[k]. */
+/* Move row k of n to index order[k]. */
 static int lexi__move_rows(lexi__call *call, void *pointer, const uint32_t *order, size_t n, size_t width) {
     unsigned char *moved = NULL, *rows;
     uint64_t left = call->left;

@@ -165,7 +165,7 @@ class Tables:
         bits = OddBits(data, "tables")
         self.used, self.many, self.same, self.new = odds(2), odds(), odds(2), odds()
         self.counts, self.present, self.delta = odds(10), odds(2), either_odds()
-        self.place = np.full(len(SETS) * 24, -1, I)     # where the table of a context begins, -1 if there is none
+        self.start = np.full(len(SETS) * 24, -1, I)     # where the table of a context begins, -1 if there is none
         p, rest, symbol = [], [], []
         at = before = 0
         for number, stream in enumerate(SETS):
@@ -179,7 +179,7 @@ class Tables:
                 p.append(np.repeat(probability, probability))
                 symbol.append(np.repeat(np.arange(len(probability)), probability))
                 rest.append(np.arange(1 << w) - np.repeat(np.cumsum(probability) - probability, probability))
-            self.place[number * 24:number * 24 + 24] = at + (np.array(table_of) << w)
+            self.start[number * 24:number * 24 + 24] = at + (np.array(table_of) << w)
             at += count << w
         bits.finish()
         self.p, self.rest, self.symbol = (np.concatenate(x or [[0]]).astype(I) for x in (p, rest, symbol))
@@ -429,11 +429,11 @@ class Lanes:
 
     def symbol(self, stream, context, who):
         sets = self.set[who] + stream * 24 if stream < 16 else (stream + 32) * 24
-        place = self.tables.place[sets + context]
-        check(place.size == 0 or place.min() >= 0, "a context has no table")
+        start = self.tables.start[sets + context]
+        check(start.size == 0 or start.min() >= 0, "a context has no table")
         w = 12 if ATOM <= stream < ATOM + 3 else 10
         state = self.state[who]
-        slot = place + (state & (1 << w) - 1)
+        slot = start + (state & (1 << w) - 1)
         self.put((state >> w) * self.tables.p.take(slot) + self.tables.rest.take(slot), who)
         symbol = self.tables.symbol.take(slot)
         if len(self.traced):
@@ -753,8 +753,8 @@ def part_rows(head, p, out):
     ends = np.concatenate([[0], np.cumsum(1 + np.where(exact, head.d, 2 * count))])
     values = np.zeros(ends[-1], I)
     values[ends[:-1]] = np.where(exact, -1, count)
-    place = ends[who] + 1 + 2 * (np.arange(len(who)) - (np.cumsum(count) - count)[who])
-    values[place], values[place + 1] = atom, size
+    at = ends[who] + 1 + 2 * (np.arange(len(who)) - (np.cumsum(count) - count)[who])
+    values[at], values[at + 1] = atom, size
     for g, row in out.rows.items() if p == 0 else ():
         values[ends[g] + 1:ends[g + 1]] = row.view("<i4")
     return ends, values
@@ -862,9 +862,9 @@ def sh_rest(head, out, there):
             value = (size.astype(F) * steps[out.colour[who]]).astype(np.float16).astype(F)
         check(np.isfinite(value).all(), "a value is not finite")
         # The k-th nonzeros of all Gaussians together: each product and each sum is rounded to f32.
-        place = np.arange(len(who)) - (np.cumsum(count) - count)[who]
+        rank = np.arange(len(who)) - (np.cumsum(count) - count)[who]
         for k in range(int(count.max(initial=0))):
-            at = np.flatnonzero(place == k)
+            at = np.flatnonzero(rank == k)
             rest[who[at]] += value[at, None] * head.atoms[atom[at]]
         for g, row in out.rows.items():
             rest[g] = row.view("<f4")
@@ -908,9 +908,9 @@ def read_block(b, n, w):
         size = b.unpack("H")[0] + 1
         check(size <= n, "C of a palette is above n")
         palette = numbers(b, b.u8(), size, w)
-        places = numbers(b, b.u8(), n, 1 if size <= 256 else 2)
-        check((places < size).all(), "a place of a palette is not below C")
-        values = palette[places.astype(I)]
+        indices = numbers(b, b.u8(), n, 1 if size <= 256 else 2)
+        check((indices < size).all(), "an index of a palette is not below C")
+        values = palette[indices.astype(I)]
     else:
         values = numbers(b, how, n, w)
     check(b.end(), "bytes follow what is in a block")

@@ -68,7 +68,7 @@ export interface Chunk {
   layer: number;
   /** Whether it is as fine as it will be. */
   complete: boolean;
-  /** Place of its first Gaussian in the scene. */
+  /** Index of its first Gaussian in the scene. */
   first: number;
   count: number;
   /** Three numbers a Gaussian. */

@@ -34,7 +34,7 @@ globalThis.result = (async () => {
   });
   // Drawing takes longest.
   if (!location.pathname.includes('inline')) viewer.src = '/golden/${SCENE}';
-  else await customElements.get('lexi-viewer').place.compile();
+  else await customElements.get('lexi-viewer').program.compile();
   return { layered: await count('/golden/${SCENE}'), whole: await count('/golden/${WHOLE}'), drawn: viewer.src && (await loaded) };
 })();
 globalThis.result.catch(() => {});

@@ -65,12 +65,12 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
     const carried = join(folder, 'carried.html');
     execFileSync(program, ['html', golden, '-o', carried, '--tools', '--quiet']);
     const scene = (await readFile(golden)).toString('base64');
-    const place = 'id="scene" data-name=""></script>';
+    const marker = 'id="scene" data-name=""></script>';
     const page = await readFile(built, 'utf8');
-    assert.equal(page.split(place).length, 2);
+    assert.equal(page.split(marker).length, 2);
     const fresh = join(folder, 'fresh.html');
     const [words] = /data-words="[^"]*"/.exec(await readFile(carried, 'utf8'));
-    const filled = page.replace(place, () => `id="scene" data-name="${SCENE}">${scene}</script>`).replace('data-words=""', () => words);
+    const filled = page.replace(marker, () => `id="scene" data-name="${SCENE}">${scene}</script>`).replace('data-words=""', () => words);
     await writeFile(fresh, filled);
     const [a, b] = [await shown(carried), await shown(fresh)];
     assert.ok(psnr(a, b) >= SAME, `${psnr(a, b)} dB`);

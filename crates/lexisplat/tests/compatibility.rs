@@ -294,7 +294,7 @@ fn with_header(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
     let text = std::str::from_utf8(&bytes[8..8 + length]).unwrap();
     let entries: Value = serde_json::from_str(text).unwrap();
     let head = entries.get("packed.head");
-    let place = |i: usize| {
+    let offset = |i: usize| {
         let offsets = &head.unwrap_or(&entries["checksum.header"])["data_offsets"];
         usize::try_from(offsets[i].as_u64().unwrap()).unwrap()
     };
@@ -304,8 +304,8 @@ fn with_header(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
     header.extend_from_slice(changed.as_bytes());
     let data = &bytes[8 + length..];
     // The checksum of a packed file covers the rest of its tensor too.
-    let sum = crc32fast::hash(&[&header, &data[place(0) + 4..place(1)]].concat()).to_le_bytes();
-    let at = place(0) + header.len();
+    let sum = crc32fast::hash(&[&header, &data[offset(0) + 4..offset(1)]].concat()).to_le_bytes();
+    let at = offset(0) + header.len();
     let mut new = [&header, data].concat();
     new[at..at + 4].copy_from_slice(&sum);
     new

@@ -10,7 +10,7 @@ use lexisplat::{
 };
 use lexisplat_sample::{SampleOptions, scene};
 
-/// Gaussians that readers and coders take together in one place or another.
+/// Gaussians that readers and coders take together.
 const BORDERS: [usize; 4] = [1024, 2048, 32_768, 65_536];
 
 fn sample(count: usize, degree: u8) -> Splats {

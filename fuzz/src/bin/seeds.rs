@@ -412,8 +412,8 @@ fn pieces(bytes: &[u8]) -> Result<Vec<u8>, Box<dyn Error>> {
         let name = usize::from(u16::from_le_bytes(rest[26..28].try_into()?));
         let (head, content) = rest[30..].split_at(name);
         let (content, after) = content.split_at(size);
-        let place = MEMBERS.iter().position(|member| member.as_bytes() == head).ok_or("an unknown member")?;
-        found[place] = content.to_vec();
+        let index = MEMBERS.iter().position(|member| member.as_bytes() == head).ok_or("an unknown member")?;
+        found[index] = content.to_vec();
         rest = after;
     }
     let mut all = vec![1];

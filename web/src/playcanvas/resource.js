@@ -93,7 +93,7 @@ function orderOf({ count, positions }, reorder) {
 function dataOf({ count, positions, scales }, shBands, order) {
   const getCenters = () => {
     const centers = new Float32Array(3 * count);
-    order.forEach((i, place) => centers.set(positions.subarray(3 * i, 3 * i + 3), 3 * place));
+    order.forEach((i, index) => centers.set(positions.subarray(3 * i, 3 * i + 3), 3 * index));
     return centers;
   };
   const calcAabb = (box) => {
@@ -118,14 +118,14 @@ function dataOf({ count, positions, scales }, shBands, order) {
 // Positions are whole floats; turns, sizes and colours are half floats, as in the engine's own resource of a PLY.
 function geometryTexels({ count, positions, scales, rotations, opacities, dc }, order) {
   const placed = new Uint32Array(4 * count);
-  const places = new Float32Array(placed.buffer);
+  const positionsOut = new Float32Array(placed.buffer);
   const shape = new Uint16Array(4 * count);
   const color = new Uint16Array(4 * count);
-  order.forEach((i, place) => {
+  order.forEach((i, index) => {
     const [w, x, y, z] = unit(rotations, 4 * i);
-    const to = 4 * place;
+    const to = 4 * index;
     for (let k = 0; k < 3; k++) {
-      places[to + k] = positions[3 * i + k];
+      positionsOut[to + k] = positions[3 * i + k];
       shape[to + k] = half(Math.exp(scales[3 * i + k]));
       color[to + k] = half(0.5 + SH_C0 * dc[3 * i + k]);
     }

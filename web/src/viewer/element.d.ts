@@ -1,5 +1,5 @@
 /** Where the parts of the viewer are. */
-export interface Place {
+export interface Program {
   /** Gives the compiled viewer. */
   compile: () => Promise<WebAssembly.Module>;
   /** Starts a worker that decodes. */
@@ -106,7 +106,7 @@ export interface LexiViewerEventMap extends HTMLElementEventMap {
  */
 export class LexiViewer extends HTMLElement {
   /** Where the program's parts are. Set it before the first element begins if they are not beside the module. */
-  static place: Place;
+  static program: Program;
   /** Addresses of the scenes. */
   src: string;
   src2: string;

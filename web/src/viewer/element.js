@@ -27,7 +27,7 @@ const Base = globalThis.HTMLElement ?? class {};
  */
 export class LexiViewer extends Base {
   /** Where the program's parts are. Set it before the first element begins if they are not beside this file. */
-  static place = folder;
+  static program = folder;
   static observedAttributes = ATTRIBUTES;
 
   #app;
@@ -47,7 +47,7 @@ export class LexiViewer extends Base {
     const goesOn = this.#begun;
     this.#begun = false;
     this.#app = new App(this.shadowRoot, {
-      place: LexiViewer.place,
+      program: LexiViewer.program,
       controls: this.#controls(),
       still: this.still,
       budget: this.#budget(),

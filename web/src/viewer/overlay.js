@@ -9,7 +9,7 @@ const MOST = 3;
 /** Makes the names and the line over the picture. @param {(split: number) => void} split */
 export function makeOverlay(split) {
   const line = wipeLine(split);
-  const [left, right, score] = ['left', 'right', 'score'].map((place) => make('span', { class: `label ${place}`, hidden: true }));
+  const [left, right, score] = ['left', 'right', 'score'].map((name) => make('span', { class: `label ${name}`, hidden: true }));
   const middle = make('span', { class: 'middle', hidden: true });
   const element = make('div', { class: 'overlay' }, middle, left, right, score, line.element);
   const label = (where, text) => {

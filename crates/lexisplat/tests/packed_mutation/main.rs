@@ -183,19 +183,19 @@ fn numbers_have_one_form() {
     }
 }
 
-/// An index that says that its ranges are sorted though they are not, or the other way round. The places of sorted ranges
+/// An index that says that its ranges are sorted though they are not, or the other way round. The ids of sorted ranges
 /// may be listed too.
 #[test]
 fn the_mark_of_sorted_ranges_is_checked() {
     let _alone = alone();
     for (name, bytes) in files().into_iter().chain([("layered", layered())]) {
-        for with_places in [false, true] {
+        for with_ids in [false, true] {
             let mut parts = Parts::of(&bytes);
             let mut index = Index::of(&mut parts);
-            let lists_all = index.is_sorted && with_places;
-            index.invert_mark(&mut parts, with_places);
+            let lists_all = index.is_sorted && with_ids;
+            index.invert_mark(&mut parts, with_ids);
             Index::seal(&mut parts);
-            assert_eq!(accepted(&parts.sealed()), lists_all, "{name}, {with_places}");
+            assert_eq!(accepted(&parts.sealed()), lists_all, "{name}, {with_ids}");
         }
     }
 }

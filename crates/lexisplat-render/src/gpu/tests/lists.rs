@@ -56,8 +56,8 @@ fn check(view: &View, scene: &Scene<'_>, camera: &Camera) -> [usize; 3] {
 
     // Each is in order of depth and holds no splat twice.
     let mut rank = vec![0; gaussians.len()];
-    for (place, slot) in view.order().into_iter().enumerate() {
-        rank[slot as usize] = place;
+    for (position, slot) in view.order().into_iter().enumerate() {
+        rank[slot as usize] = position;
     }
     let (mut listed, mut needed, mut outside) = (0, 0, 0);
     for (tile, list) in lists.iter().enumerate() {

@@ -91,7 +91,7 @@ fn more_blocks_than_one_dimension_has_get_slots() {
     let blocks = MAX_GROUPS + 300;
     let bench = Bench::new(&gpu, blocks);
     let words = GROUP / u32::BITS;
-    // One Gaussian in most blocks, at a place that varies.
+    // One Gaussian in most blocks, at an index that varies.
     let marked: Vec<u32> = (0..blocks).filter(|b| b % 7 != 3).map(|b| b * GROUP + b * 31 % GROUP).collect();
     let mut masks = vec![0_u32; (blocks * words) as usize];
     let mut starts = vec![0_u32; blocks as usize];

@@ -2,7 +2,7 @@
 
 use super::available_ranges::Data;
 use super::decoder::Decoder;
-use super::place::{indices, places};
+use super::output::{chunk_outputs, indices};
 use crate::packed::bitstream::stream::{BitCounts, StreamBits};
 use crate::packed::scene::Packed;
 use crate::scene::splats::Geometry;
@@ -92,11 +92,12 @@ impl Packed {
         let extras = if n == self.len() { self.extras().to_vec() } else { Vec::new() };
         let mut g = Geometry { extras, ..Geometry::zeros(n) };
         let mut counts = vec![0; n];
-        // Chunks are decoded into their final places, so that a scene is in memory once.
+        // Chunks are decoded into their parts of the scene, so that a scene is in memory once.
         let spans = decoder.spans();
-        let work: Vec<_> = places(&mut g, &mut counts, spans).into_iter().zip(spans).enumerate().collect();
-        let pieces = map_vec(work, |(c, (mut place, span))| {
-            decoder.piece(Data::First(data), c, span.start, &mut place, &budget, count_bits)
+        let work: Vec<_> =
+            chunk_outputs(&mut g, &mut counts, spans).into_iter().zip(spans).enumerate().collect();
+        let pieces = map_vec(work, |(c, (mut output, span))| {
+            decoder.piece(Data::First(data), c, span.start, &mut output, &budget, count_bits)
         });
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();

@@ -299,7 +299,7 @@ fn join_groups(groups: &mut Vec<Group>, cost: impl Fn(&Histogram) -> f64) {
 const MOST_PRECISION: u32 = 12;
 /// Number of entries of a set: at least one for each context. It is a power of two, so that a masked number is a valid
 /// index.
-const PLACES: usize = CONTEXTS.next_power_of_two();
+const SET_SLOTS: usize = CONTEXTS.next_power_of_two();
 /// The context of lanes that take no symbol. They get 0, and their states do not change.
 pub(in crate::packed) const IDLE: u32 = CONTEXTS as u32;
 
@@ -308,7 +308,7 @@ pub(in crate::packed) const IDLE: u32 = CONTEXTS as u32;
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Lookup {
     /// The start of the table of each context in `entries`, set by set.
-    sets: Vec<[u32; PLACES]>,
+    sets: Vec<[u32; SET_SLOTS]>,
     entries: Vec<Entry>,
 }
 
@@ -337,7 +337,7 @@ impl Lookup {
                     entries.extend((0..interval.share).map(|over| entry(symbol, interval.share, over)));
                 }
             }
-            let mut set = [idle[slot.stream.precision() as usize]; PLACES];
+            let mut set = [idle[slot.stream.precision() as usize]; SET_SLOTS];
             let mut last = 0;
             for (start, &table) in set.iter_mut().zip(map) {
                 // A context that is never used has the table of the context before, as in the written form.
@@ -360,7 +360,7 @@ impl Lookup {
 /// The tables of a set of contexts.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::packed) struct Set<'l> {
-    starts: &'l [u32; PLACES],
+    starts: &'l [u32; SET_SLOTS],
     entries: &'l [Entry],
 }
 
@@ -371,7 +371,7 @@ impl Set<'_> {
     /// Returns the entry for `low` in the table of `context`, which is below [`CONTEXTS`] or is [`IDLE`].
     #[inline(always)]
     pub(in crate::packed) fn entry(&self, context: u32, low: u32) -> Entry {
-        let start = self.starts[context as usize % PLACES];
+        let start = self.starts[context as usize % SET_SLOTS];
         self.entries.get((start + low) as usize).copied().unwrap_or(0)
     }
 }
@@ -394,7 +394,7 @@ pub(in crate::packed) fn over(entry: Entry) -> u32 {
     entry >> (8 + MOST_PRECISION)
 }
 
-const _: () = assert!((IDLE as usize) < PLACES);
+const _: () = assert!((IDLE as usize) < SET_SLOTS);
 
 #[cfg(test)]
 mod tests {

@@ -232,7 +232,7 @@ impl LexiFeed {
             return Err(checked.malformed("the layout is not 'packed'"));
         }
         let head = super::packed::head(&checked, &self.limits)?;
-        let (data_start, data_bytes) = super::packed::data_place(&checked);
+        let (data_start, data_bytes) = super::packed::data_span(&checked);
         let mut decoder = Decoder::new(&head, data_bytes)?;
         decoder.options.sh_parts = self.options.sh_parts;
         decoder.options.verify = self.options.verify_integers;

@@ -289,7 +289,7 @@ impl Plan {
             layout.pack(splats, &mut bytes);
             for (key, row) in keys.iter().zip(bytes.chunks_exact(layout.bytes())) {
                 let piece = pieces.entry(buckets.of(*key)).or_default();
-                piece.places.push(*key);
+                piece.keys.push(*key);
                 piece.rows.extend_from_slice(row);
             }
             Ok(())
@@ -387,7 +387,7 @@ impl Buckets<'_> {
 pub(super) struct Piece {
     pub(super) plan_id: u32,
     pub(super) bucket: usize,
-    pub(super) places: Vec<MortonKey>,
+    pub(super) keys: Vec<MortonKey>,
     pub(super) rows: Vec<u8>,
 }
 
