@@ -1050,11 +1050,11 @@ static int lexi__open_plain(lexi__call *call, lexi_file *f) {
     return 1;
 }
 
-/* ---- Words of 16 bits: bits with odds, and lanes of symbols ---- */
+/* ---- Words of 16 bits: adaptive bits, and lanes of symbols ---- */
 
 typedef struct { const unsigned char *p; size_t words, next; uint32_t state; } lexi__coder;
-typedef struct { uint16_t zero; uint8_t seen; } lexi__odds;
-enum { LEXI__EITHER = 18 }; /* odds of `either`: nonzero, negative, lengths[16] */
+typedef struct { uint16_t zero; uint8_t seen; } lexi__bit_model;
+enum { LEXI__EITHER = 18 }; /* models of `either`: nonzero, negative, lengths[16] */
 
 static int lexi__start(lexi__coder *c, const unsigned char *p, size_t words) {
     c->p = p;
@@ -1081,13 +1081,12 @@ static int lexi__split(lexi__coder *c, uint32_t p) {
     return b;
 }
 
-static int lexi__bit(lexi__coder *c, lexi__odds *odds) {
+static int lexi__bit(lexi__coder *c, lexi__bit_model *model) {
     static const uint8_t rates[6] = {1, 2, 3, 4, 4, 5};
-    int b = lexi__split(c, odds->zero), rate = rates[odds->seen];
-    odds->zero =
-        (uint16_t)lexi__clamp(b ? odds->zero - (odds->zero >> rate) : odds->zero + ((4096 - odds->zero) >> rate), 48,
-                              4048);
-    if (odds->seen < 5) odds->seen++;
+    int b = lexi__split(c, model->zero), rate = rates[model->seen];
+    model->zero = (uint16_t)lexi__clamp(
+        b ? model->zero - (model->zero >> rate) : model->zero + ((4096 - model->zero) >> rate), 48, 4048);
+    if (model->seen < 5) model->seen++;
     return b;
 }
 
@@ -1097,22 +1096,22 @@ static int32_t lexi__even(lexi__coder *c, int n) {
     return x;
 }
 
-static int32_t lexi__positive(lexi__coder *c, lexi__odds *list, int length) {
+static int32_t lexi__positive(lexi__coder *c, lexi__bit_model *list, int length) {
     int n = 1;
     while (n < length && lexi__bit(c, &list[n])) n++;
     return (int32_t)1 << (n - 1) | lexi__even(c, n - 1);
 }
 
-static int32_t lexi__either(lexi__coder *c, lexi__odds *odds) {
+static int32_t lexi__either(lexi__coder *c, lexi__bit_model *models) {
     int negative;
-    if (!lexi__bit(c, &odds[0])) return 0;
-    negative = lexi__bit(c, &odds[1]);
-    int32_t x = lexi__positive(c, odds + 2, 16);
+    if (!lexi__bit(c, &models[0])) return 0;
+    negative = lexi__bit(c, &models[1]);
+    int32_t x = lexi__positive(c, models + 2, 16);
     return negative ? -x : x;
 }
 
-static void lexi__even_odds(lexi__odds *odds, size_t n) {
-    for (size_t i = 0; i < n; i++) { odds[i].zero = 2048; odds[i].seen = 0; }
+static void lexi__even_models(lexi__bit_model *models, size_t n) {
+    for (size_t i = 0; i < n; i++) { models[i].zero = 2048; models[i].seen = 0; }
 }
 
 /* ---- packed.head ---- */
@@ -1161,7 +1160,7 @@ static int lexi__read_integers(lexi__call *call, lexi__head *h, const unsigned c
     static const uint8_t sizes[15] = {1, 3, 9, 3, 9, 7, 7, 7, 7, 7, 6, 5, 4},
                          zeros[13] = {2, 2, 4, 2, 4, 2, 2, 4, 4, 4, 4, 4, 4};
     lexi__coder c;
-    lexi__odds odds[LEXI__EITHER];
+    lexi__bit_model models[LEXI__EITHER];
     list[count++] = &h->cell_log;
     for (int which = 0; which < 2; which++) {
         int32_t(*rows)[4] = which ? h->move : h->turn;
@@ -1174,9 +1173,9 @@ static int lexi__read_integers(lexi__call *call, lexi__head *h, const unsigned c
     if (n % 2 || !lexi__start(&c, p, n / 2))
         return lexi__refuse(call, "packed.head, integers", "they are no words with a first state of at least 2^16");
     for (int group = 0, i = 0; group < 13; group++) {
-        lexi__even_odds(odds, LEXI__EITHER);
+        lexi__even_models(models, LEXI__EITHER);
         for (int k = 0; k < sizes[group]; k++, i++) {
-            int32_t x = lexi__either(&c, odds) * (1 << zeros[group]);
+            int32_t x = lexi__either(&c, models) * (1 << zeros[group]);
             if (x < -32768 || x > 32767)
                 return lexi__damaged(call, "packed.head, integers", "number % is %, beyond 16 bits", i, x);
             *list[i] = x;
@@ -1211,16 +1210,16 @@ static void lexi__make_table(lexi__table *t, int w, int symbols, const uint8_t *
 /* Check 11. Sets 51 to 53 are those of Atom0 to Atom2. */
 static int lexi__read_tables(lexi__call *call, lexi_file *f, const unsigned char *p, size_t n) {
     lexi__coder c;
-    lexi__odds used[2], many, same[2], newer, counts[10], present[2], delta[LEXI__EITHER];
+    lexi__bit_model used[2], many, same[2], newer, counts[10], present[2], delta[LEXI__EITHER];
     size_t count = 0, room = 0;
     int has = 0;
-    lexi__even_odds(used, 2);
-    lexi__even_odds(&many, 1);
-    lexi__even_odds(same, 2);
-    lexi__even_odds(&newer, 1);
-    lexi__even_odds(counts, 10);
-    lexi__even_odds(present, 2);
-    lexi__even_odds(delta, LEXI__EITHER);
+    lexi__even_models(used, 2);
+    lexi__even_models(&many, 1);
+    lexi__even_models(same, 2);
+    lexi__even_models(&newer, 1);
+    lexi__even_models(counts, 10);
+    lexi__even_models(present, 2);
+    lexi__even_models(delta, LEXI__EITHER);
     if (n % 2 || !lexi__start(&c, p, n / 2))
         return lexi__refuse(call, "packed.head, tables", "they are no words with a first state of at least 2^16");
     for (int set = 0; set < 61; set++) {
@@ -1267,12 +1266,12 @@ static int lexi__read_tables(lexi__call *call, lexi_file *f, const unsigned char
 static int lexi__read_dictionary(lexi__call *call, lexi_file *f, int fixed, const unsigned char *p, size_t n) {
     const double s = 0.5773502691896257, t = 0.7071067811865476, u = 0.4082482904638631, v = 0.8164965809277261;
     size_t d = (size_t)f->info.d, third = d / 3, learned = (size_t)f->info.m - (fixed ? d : 0);
-    lexi__odds odds[4][3][5][LEXI__EITHER];
+    lexi__bit_model models[4][3][5][LEXI__EITHER];
     lexi__coder c;
     if (!learned && n)
         return lexi__damaged(call, "packed.head, dictionary", "it has % bytes, but no atom is learned", n, 0);
     if (!lexi__resize(call, &f->dictionary, 0, (uint64_t)f->info.m * d, sizeof(float))) return 0;
-    lexi__even_odds(odds[0][0][0], sizeof odds / sizeof(lexi__odds));
+    lexi__even_models(models[0][0][0], sizeof models / sizeof(lexi__bit_model));
     if (learned && (n % 2 || !lexi__start(&c, p, n / 2)))
         return lexi__refuse(call, "packed.head, dictionary", "it is no words with a first state of at least 2^16");
     for (size_t i = 0; i < learned; i++) {
@@ -1282,7 +1281,7 @@ static int lexi__read_dictionary(lexi__call *call, lexi_file *f, int fixed, cons
             int32_t(*now)[3] = &x[k + 2];
             for (int a = 0; a < 3; a++) {
                 uint32_t near = lexi__abs(now[-1][a]) + (a ? lexi__abs(now[0][0]) >> 1 : lexi__abs(now[-2][0]));
-                now[0][a] = lexi__either(&c, odds[k < 3    ? 0
+                now[0][a] = lexi__either(&c, models[k < 3    ? 0
                                                   : k < 8  ? 1
                                                   : k < 15 ? 2
                                                            : 3][a][lexi__min(lexi__bitlength(near), 4)]);

@@ -81,22 +81,22 @@ class Bytes:
         return self.at == len(self.data)
 
 
-# Bits with odds: integers, tables and dictionary
+# Adaptive bits: integers, tables and dictionary
 
-class Odds:
+class BitModel:
     def __init__(self):
         self.zero, self.seen = 2048, 0
 
 
-def odds(*shape):
-    return [odds(*shape[1:]) for _ in range(shape[0])] if shape else Odds()
+def models(*shape):
+    return [models(*shape[1:]) for _ in range(shape[0])] if shape else BitModel()
 
 
-def either_odds():
-    return odds(), odds(), odds(16)
+def either_models():
+    return models(), models(), models(16)
 
 
-class OddBits:
+class AdaptiveBits:
     def __init__(self, data, what):
         self.what = what
         check(len(data) % 2 == 0, f"the {what} are not of whole words")
@@ -162,9 +162,9 @@ class Tables:
     """For each number of 0 to 2^w - 1, and each table, the symbol and what becomes of the state."""
 
     def __init__(self, data):
-        bits = OddBits(data, "tables")
-        self.used, self.many, self.same, self.new = odds(2), odds(), odds(2), odds()
-        self.counts, self.present, self.delta = odds(10), odds(2), either_odds()
+        bits = AdaptiveBits(data, "tables")
+        self.used, self.many, self.same, self.new = models(2), models(), models(2), models()
+        self.counts, self.present, self.delta = models(10), models(2), either_models()
         self.start = np.full(len(SETS) * 24, -1, I)     # where the table of a context begins, -1 if there is none
         p, rest, symbol = [], [], []
         at = before = 0
@@ -217,8 +217,8 @@ class Tables:
 def read_dictionary(data, m, d, fixed):
     learned, n, atoms = m - d if fixed else m, d // 3, np.zeros((m, d), F)
     check(learned or not data, "the dictionary is not empty, though no atom is learned")
-    bits = OddBits(data, "numbers of the dictionary") if learned else None
-    o = [[[either_odds() for _ in range(5)] for _ in range(3)] for _ in range(4)]
+    bits = AdaptiveBits(data, "numbers of the dictionary") if learned else None
+    o = [[[either_models() for _ in range(5)] for _ in range(3)] for _ in range(4)]
     for atom in atoms[:learned]:
         x = [[0, 0, 0] for _ in range(n)]
         for k in range(n):
@@ -284,10 +284,10 @@ class Head:
         check(b.end(), "bytes of the head are left")
 
     def read_integers(self, data):
-        bits = OddBits(data, "integers")
+        bits = AdaptiveBits(data, "integers")
 
         def group(count, zeros):
-            o = either_odds()
+            o = either_models()
             values = [bits.either(o) << zeros for _ in range(count)]
             check(all(-1 << 15 <= x < 1 << 15 for x in values), "one of the integers is not from -32768 to 32767")
             return np.array(values, I)

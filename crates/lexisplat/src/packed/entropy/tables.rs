@@ -157,14 +157,14 @@ impl Tables {
 
     /// Codes the numbers of tables of contexts, and the tables. A decoder codes empty ones and gets the decoded ones.
     fn code(&self, bits: &mut dyn Bits) -> Result<Self, BrokenHead> {
-        let mut odds = TablesOdds::default();
+        let mut models = TablesModels::default();
         let mut all = Self { map: Vec::with_capacity(ALL_CONTEXTS), tables: Vec::with_capacity(SLOTS) };
         let mut before = false;
         for slot in Slot::all() {
             let own = self.tables.get(slot.number).map_or(&[][..], Vec::as_slice);
-            before = bits.bit(&mut odds.used[usize::from(before)], !own.is_empty());
+            before = bits.bit(&mut models.used[usize::from(before)], !own.is_empty());
             let mut count = usize::from(before);
-            if !before || !bits.bit(&mut odds.many, own.len() > 1) {
+            if !before || !bits.bit(&mut models.many, own.len() > 1) {
                 all.map.extend([0; CONTEXTS]);
             } else {
                 let mut last = 0;
@@ -173,10 +173,10 @@ impl Tables {
                     let wanted = self.map.get(slot.number * CONTEXTS + context).copied().unwrap_or(NONE);
                     // A context that is never used has the table of the context before.
                     let wanted = if wanted == NONE { last } else { usize::from(wanted) };
-                    let same = &mut odds.same[usize::from(all.map.len() % CONTEXTS > 1 && odds.changed)];
-                    odds.changed = bits.bit(same, wanted != last);
-                    if odds.changed {
-                        last = match bits.bit(&mut odds.new, wanted == count) {
+                    let same = &mut models.same[usize::from(all.map.len() % CONTEXTS > 1 && models.changed)];
+                    models.changed = bits.bit(same, wanted != last);
+                    if models.changed {
+                        last = match bits.bit(&mut models.new, wanted == count) {
                             true => count,
                             false => {
                                 let width = usize::BITS - (count - 1).leading_zeros();
@@ -197,7 +197,7 @@ impl Tables {
             for k in 0..count {
                 let none = LogProbabilities::default();
                 let levels = own.get(k).map_or(&none, |table| &table.levels);
-                let levels = levels.code(bits, &mut odds.levels, precision)?;
+                let levels = levels.code(bits, &mut models.levels, precision)?;
                 let no_symbols = || BrokenHead("the tables: a table has no symbols".to_owned());
                 tables.push(Table::new(levels, precision).ok_or_else(no_symbols)?);
             }
@@ -209,7 +209,7 @@ impl Tables {
 
 /// The adaptive probabilities of the bits of [`Tables`].
 #[derive(Debug, Default)]
-struct TablesOdds {
+struct TablesModels {
     /// Whether a set of contexts is used, by whether the set before is.
     used: [BitModel; 2],
     /// Whether a set has several tables.
