@@ -219,8 +219,8 @@ fn tensors_that_may_be_ignored_are_but_their_checksum_is_not() {
         let at = bytes.windows(6).position(|w| w == [7; 6]).unwrap();
         bytes[at] ^= 1;
         for error in refusals(&bytes, parts.metadata["degree"].as_str().unwrap()) {
-            let problem = matches!(&error, Error::Format { problem: FormatError::Checksum { part }, .. }
-                if part == "x-thumbnail");
+            let problem = matches!(&error, Error::Format { problem: FormatError::Checksum { covered }, .. }
+                if covered == "x-thumbnail");
             assert!(problem, "{name}: {error}");
         }
     }

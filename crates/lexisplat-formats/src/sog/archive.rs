@@ -142,7 +142,7 @@ impl<'a> Archive<'a> {
             return Err(malformed(&format!("has not the {plain} bytes that the directory says")));
         }
         if crc32fast::hash(&content) != member.checksum {
-            return Err(Error::format(self.name, FormatError::Checksum { part: called.to_owned() }));
+            return Err(Error::format(self.name, FormatError::Checksum { covered: called.to_owned() }));
         }
         Ok(Content::Member(content, packed.len() as u64))
     }

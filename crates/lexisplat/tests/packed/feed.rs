@@ -151,18 +151,18 @@ fn a_wrong_byte_is_found_in_its_range_and_asked_for_again() {
         let at = index(range.bytes.start) + random.below(index(range.bytes.end - range.bytes.start));
         damaged[at] ^= 1 << random.below(8);
         let mut feed = feed(&FeedOptions::default());
-        let part = loop {
+        let covered = loop {
             let wanted = feed.wants().unwrap();
             match give(&mut feed, &damaged, wanted) {
                 Ok(()) => {}
-                Err(Error::Format { problem: FormatError::Checksum { part }, .. }) => break part,
+                Err(Error::Format { problem: FormatError::Checksum { covered }, .. }) => break covered,
                 Err(other) => panic!("{other}"),
             }
         };
-        assert!(part.ends_with(&format!("of chunk {}", range.chunk)), "{part}: {range:?}");
+        assert!(covered.ends_with(&format!("of chunk {}", range.chunk)), "{covered}: {range:?}");
         // The message of the reader of whole files is the same.
         let error = lexi::read_bytes(NAME, &damaged, &Limits::default()).unwrap_err().to_string();
-        assert!(error.contains(&format!("'{part}'")), "{error}: {part}");
+        assert!(error.contains(&format!("'{covered}'")), "{error}: {covered}");
         assert_eq!(feed.wants(), Some(range.bytes.clone()));
         fill(&mut feed, file);
         assert!(feed.is_complete());

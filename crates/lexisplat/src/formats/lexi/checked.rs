@@ -119,7 +119,7 @@ impl<'a> Checked<'a> {
             _ => (checked.values::<u32>(tensor::HEADER_CHECKSUM, Dtype::U32, &[1])?, header_checksum),
         };
         if stored != [expected] {
-            return Err(format(FormatError::Checksum { part: "header".to_owned() }));
+            return Err(format(FormatError::Checksum { covered: "header".to_owned() }));
         }
         checked.verify_tensors()?;
         Ok(checked)
@@ -160,7 +160,7 @@ impl<'a> Checked<'a> {
         });
         for (name, sum) in names.iter().zip(found) {
             if sum.ok().as_deref() != Some(listed(name)) {
-                return Err(Error::format(&self.file, FormatError::Checksum { part: (*name).to_owned() }));
+                return Err(Error::format(&self.file, FormatError::Checksum { covered: (*name).to_owned() }));
             }
         }
         Ok(())

@@ -109,8 +109,8 @@ impl BitstreamDecoder {
         })?;
         for (k, (sum, _)) in sums.iter().zip(&ranges).enumerate().filter(|(_, (_, range))| range.is_some()) {
             if chunk.ranges.get(k).is_none_or(|range| range.integers != *sum) {
-                let part = format!("the integers of range {k} of chunk {c}");
-                return Err(Error::format(&self.file, FormatError::Checksum { part }));
+                let covered = format!("the integers of range {k} of chunk {c}");
+                return Err(Error::format(&self.file, FormatError::Checksum { covered }));
             }
         }
         for escape in &mut piece.escapes.gaussians {
@@ -146,8 +146,8 @@ impl BitstreamDecoder {
             };
             let wanted = data.range(range.start, range.length).filter(|_| is_needed && is_wanted(k));
             if wanted.is_some_and(|bytes| !data.is_verified() && crc32::hash(bytes) != range.checksum) {
-                let part = format!("range {k} of chunk {c}");
-                return Err(Error::format(&self.file, FormatError::Checksum { part }));
+                let covered = format!("range {k} of chunk {c}");
+                return Err(Error::format(&self.file, FormatError::Checksum { covered }));
             }
             ranges.push(wanted);
         }

@@ -172,8 +172,8 @@ impl Ranges {
 
     fn wrong(&self, range: &RangeOutline) -> Error {
         let k = self.outline.number(range);
-        let part = format!("range {k} of chunk {}", range.chunk);
-        Error::format(&self.head.file, FormatError::Checksum { part })
+        let covered = format!("range {k} of chunk {}", range.chunk);
+        Error::format(&self.head.file, FormatError::Checksum { covered })
     }
 
     /// The states of the ranges of chunk `c`.
