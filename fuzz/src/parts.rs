@@ -170,7 +170,7 @@ fn same(a: &[f32], b: &[f32]) {
     assert!(a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits())), "{a:?} is not {b:?}");
 }
 
-/// Which type, and the bits of value `i`.
+/// Returns the number of the type, and the bits of value `i`.
 fn bits(values: &ExtraValues, i: usize) -> (u8, u64) {
     match values {
         ExtraValues::I8(v) => (0, u64::from(v[i].cast_unsigned())),

@@ -25,7 +25,7 @@ export interface Progress {
   stalled?: number;
 }
 
-/** What a file says of itself. */
+/** The header of a file. */
 export interface Header {
   /** Version of the format. */
   version: number;

@@ -141,7 +141,7 @@ class Address {
 
   async read(at, signal) {
     const before = this.#at - this.#piece.length;
-    // What was not taken of the last piece is given again.
+    // The part of the last piece that was not taken is given again.
     if (this.#reader && at >= before && at < this.#at) return this.#piece.subarray(at - before);
     const skipped = at - this.#at;
     if (!this.#reader || skipped < 0 || (skipped > WORTH_SKIPPING && this.#ranges)) await this.#request(at, signal);
@@ -151,7 +151,7 @@ class Address {
       const start = this.#at;
       this.#at += piece.length;
       this.#piece = piece;
-      // What was asked for may begin within the piece, or after it.
+      // The wanted bytes may begin within the piece, or after it.
       if (this.#at > at) return at > start ? piece.subarray(at - start) : piece;
     }
   }

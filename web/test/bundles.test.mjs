@@ -50,7 +50,7 @@ async function load(name) {
   return module.default?.build || typeof module.default === 'function' ? module.default : module;
 }
 
-/** What builds `app/main.js` into `app/<name>/` and gives the script of the page there. */
+/** Functions that build `app/main.js` into `app/<name>/` and return the script of the page there. */
 const BUNDLERS = {
   async vite(app, options = {}) {
     const { build } = await load('vite');

@@ -40,7 +40,7 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
     await rm(folder, { recursive: true });
   });
 
-  /** What the page at `path` shows at rest, without its panel. */
+  /** Returns the picture of the page at `path` at rest, without its panel. */
   async function shown(path) {
     const page = await newPage(browser, { viewport: { width: 320, height: 200 } });
     page.setDefaultTimeout(PATIENCE);
@@ -103,7 +103,7 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
       };
       const view = await picture();
       const still = await picture(() => delete Navigator.prototype.gpu);
-      // What the still picture covers, of 16 by 9 whose shorter side is that of the window. Beside it there is nothing.
+      // The still picture covers 16 by 9 whose shorter side is that of the window. Beside it there is nothing.
       const short = Math.min(width, height);
       const edge = [(width - (short * 16) / 9) / 2, (height - short) / 2].map((side) => Math.max(0, Math.ceil(side)) + MOVED);
       const error = ([right, down]) => {

@@ -1,4 +1,4 @@
-//! What the feed of the main thread asks for, and what workers make of its jobs. Errors of JavaScript cannot be made outside of
+//! Requests of the main thread's feed, and results of its jobs in workers. Errors of JavaScript cannot be made outside of
 //! it, so what is refused is tested in `web/test`.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]

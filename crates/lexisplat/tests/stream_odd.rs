@@ -82,7 +82,7 @@ fn plys() -> Vec<(&'static str, Vec<u8>)> {
         holes.geometry.scales[border - 1][0] = f32::NAN;
         holes.geometry.scales[border][1] = f32::INFINITY;
     }
-    // What is left of the first of these ends just at a border.
+    // The remaining rows of the first of these scenes end just at a border.
     (0..7).for_each(|i| holes.geometry.positions[i][2] = f32::NAN);
     let mut only_holes = sample(3000, 1);
     only_holes.geometry.dc.iter_mut().for_each(|dc| dc[0] = f32::NAN);

@@ -23,7 +23,7 @@ use lexisplat_formats::{Kind, WriteOptions};
 use lexisplat_fuzz::container::FEED_SCRIPT;
 use lexisplat_render::{Camera, orbit};
 use lexisplat_sample::{SampleOptions, scene};
-// What the build with coverage calls.
+// The build with coverage calls this crate.
 use libfuzzer_sys as _;
 
 type Done = Result<(), Box<dyn Error>>;

@@ -22,7 +22,7 @@ const MOST_DEGREE = 3;
 // Bounds of a Gaussian in standard deviations, as PlayCanvas takes them.
 const BOUND = 2;
 
-/** What an entity's gsplat component draws. SH stay codes on the GPU. */
+/** The resource that an entity's gsplat component draws. SH stay codes on the GPU. */
 export class LexiResource extends GSplatResourceBase {
   /**
    * @param {import('playcanvas').GraphicsDevice} device
@@ -89,7 +89,7 @@ function orderOf({ count, positions }, reorder) {
   return new GSplatData([{ name: 'vertex', count, properties: ['x', 'y', 'z'].map(column) }]).calcMortonOrder();
 }
 
-// What GSplatResourceBase asks of a scene's data.
+// The methods of a scene's data that GSplatResourceBase calls.
 function dataOf({ count, positions, scales }, shBands, order) {
   const getCenters = () => {
     const centers = new Float32Array(3 * count);

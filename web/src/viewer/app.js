@@ -37,7 +37,7 @@ const PLACES = /^\s*(view|camera|orbit|frame)\b/;
  */
 
 export class App {
-  /** What the viewer said after its last picture. */
+  /** The viewer's report of its last picture. */
   report;
   #stop = new AbortController();
   #begun;

@@ -6,7 +6,7 @@ import { reason } from './dom.js';
 // Most bytes that a scene and its drawing may take on the GPU. Phones end pages that take more.
 const MEMORY = 2 ** 30;
 
-/** What is known of a scene that is being loaded, or was.
+/** The state of a scene that is being loaded, or was.
  * @typedef {object} Load
  * @property {string} name
  * @property {boolean} file whether it is a file, not an address

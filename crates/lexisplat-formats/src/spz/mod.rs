@@ -244,7 +244,7 @@ mod tests {
         WriteOptions { spz_version: version, ..WriteOptions::default() }
     }
 
-    /// What is said of scenes at the origin, far away, and of those with an offset.
+    /// Warnings of scenes at the origin, far away, and with an offset.
     #[test]
     fn steps_that_are_coarse_far_away_are_told() {
         let near = scene(&SampleOptions::new(60, 1));

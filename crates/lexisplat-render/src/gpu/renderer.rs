@@ -454,7 +454,7 @@ fn picture_key(scene: &GpuScene, camera: &Camera) -> PictureKey {
     (scene.id, camera.width, camera.height)
 }
 
-/// What a view lacked: larger buffers, or smaller bands.
+/// The need of a view that could not be drawn: larger buffers, or smaller bands.
 enum Missing {
     Capacity {
         slots: u32,

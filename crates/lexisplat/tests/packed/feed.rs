@@ -29,7 +29,7 @@ fn outline(file: &[u8]) -> Outline {
     LexiReader::open(NAME, file, &Limits::default()).unwrap().outline().unwrap().clone()
 }
 
-/// What each chunk of `reader` decodes to.
+/// Returns the decoded chunks of `reader`.
 fn chunks(reader: &LexiReader<'_>) -> Vec<Model> {
     let mut chunks = Vec::new();
     reader
@@ -229,7 +229,7 @@ fn the_allowance_is_kept() {
     }
     assert!(models.into_iter().map(Option::unwrap).eq(whole));
 
-    // What is given beyond it is refused, and nothing of it taken.
+    // Bytes beyond it are refused, and none of them is taken.
     let mut tight = self::feed(&FeedOptions::default().with_most_bytes(start + 10));
     fill(&mut tight, file);
     assert!(tight.head().is_some() && !tight.is_complete() && tight.held_bytes() <= start + 10);
@@ -242,7 +242,7 @@ fn the_allowance_is_kept() {
     give(&mut none, file, 0..9).unwrap_err();
     assert!(matches!(none.feed(5000, &[0; 200]), Err(Error::Limit { .. })));
     assert!(none.held_bytes() <= 100);
-    // What is not asked for takes no room.
+    // Ranges that are not asked for take no room.
     let mut without = self::feed(&FeedOptions::default().with_sh_parts(0).with_most_bytes(start));
     fill(&mut without, file);
     let sh = outline.ranges.iter().find(|range| matches!(range.kind, RangeKind::Sh(_))).unwrap();
@@ -396,7 +396,7 @@ fn extras_are_left_out_of_a_first_part() {
     assert_eq!(all.empty().geometry.extras.len(), 2);
 }
 
-/// What the header alone says must be right of tensors too that are not there yet.
+/// The header must also be right about tensors that are not there yet.
 #[test]
 fn tensors_that_are_not_there_yet_are_described_rightly() {
     let splats = with_extras(sample(500, 3, 1));

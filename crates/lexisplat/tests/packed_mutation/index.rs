@@ -65,7 +65,7 @@ struct Range {
     at: usize,
 }
 
-/// What a head says of layers, chunks and ranges, and where it says so.
+/// The layers, chunks and ranges of a head, and the positions of their numbers.
 #[derive(Clone, Default)]
 pub(crate) struct Index {
     /// Bytes of the head before it.
@@ -137,7 +137,7 @@ impl Head<'_> {
 }
 
 impl Index {
-    /// That of a file as it was written.
+    /// Returns the index of a file as it was written.
     pub(crate) fn of(parts: &mut Parts) -> Self {
         let data = parts.tensor("packed.data").unwrap().len() as u64;
         let head = parts.tensor("packed.head").unwrap();
@@ -147,7 +147,7 @@ impl Index {
         index
     }
 
-    /// What docs/FORMAT.md says of a head, which may be damaged.
+    /// Reads a head, which may be damaged, by the rules of docs/FORMAT.md.
     fn read(head: &[u8]) -> Option<Self> {
         let mut from = Head { bytes: head, at: SEAL, numbers: Vec::new() };
         from.number(false)?;
@@ -251,7 +251,7 @@ impl Index {
                 0 => head[at] ^= 1 << random.below(8),
                 1 => head[at] = random.byte(),
                 2 => head[at] = head[at].wrapping_add(1),
-                // What follows stays where it is, and all of it moves.
+                // The bytes that follow keep their order and move.
                 3 if several == 1 => drop(head.drain(at..(at + width).min(end))),
                 4 if several == 1 => drop(head.splice(at..at, vec![noise; width])),
                 _ => head[at..(at + width).min(end)].fill(noise),

@@ -25,7 +25,7 @@ const ALLOWED_PER_BYTE: usize = 542;
 /// grows, and 256 symbols of 16 bytes. A table may take 2 bytes of a file. The dictionary is read when the list has
 /// grown, and takes less than that had taken. [`a_head_takes_its_bytes`] has all of them.
 const ALLOWED_HEAD: usize = (58 * 24 * (4 << 10) + 3 * 24 * (16 << 10)) * 2 + 61 * 24 * (256 * 16 + 64);
-/// What is rounded up, and the container of a short file.
+/// Bytes for rounding up, and for the container of a short file.
 const ALLOWED_BASE: usize = 64 << 10;
 /// Of each thread the 64 Gaussians of 72 values of 16 lanes after which a chunk is asked whether it has bits left, as codes
 /// or rows, lists growing.

@@ -42,7 +42,7 @@ fn check(view: &View, scene: &Scene<'_>, camera: &Camera) -> [usize; 3] {
     let ranges: Vec<[u32; 2]> = view.gpu.read_back(&view.work().ranges);
     let mut lists: Vec<Vec<u32>> = vec![Vec::new(); tiles];
     for &(tile, slot) in &entries {
-        // What belongs to no tile comes last.
+        // Entries of no tile come last.
         if (tile as usize) < tiles {
             lists[tile as usize].push(slot);
         }

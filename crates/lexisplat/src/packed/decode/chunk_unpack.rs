@@ -144,7 +144,7 @@ struct Out<'j, 'p> {
     uncovered: &'j [Range<u64>],
     /// Index of the first Gaussian of each lane.
     starts: [usize; LANES + 1],
-    /// The nonzeros of each lane. Those of one Gaussian are in ascending order of atoms.
+    /// The nonzeros of each lane. The nonzeros of one Gaussian are in ascending order of atoms.
     nonzeros: Lanes<Vec<Nonzero>>,
     escapes: Lanes<Escapes>,
     /// Positions of the Gaussians of the block. Empty if there are no points of view.

@@ -38,10 +38,10 @@ impl Packed {
         }
     }
 
-    /// Returns the number of bits of each stream. Those of tables and other parameters are not counted.
+    /// Returns the number of bits of each stream. Bits of tables and other parameters are not counted.
     ///
     /// # Errors
-    /// Those of [`Self::unpack`].
+    /// As [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
         let (_, bits) = self.decode_with(&self.decoder()?, self.data(), true)?;
         Ok(bits.named())
@@ -50,7 +50,7 @@ impl Packed {
     /// Returns the dictionary alone.
     ///
     /// # Errors
-    /// Those of [`Self::unpack`].
+    /// As [`Self::unpack`].
     pub fn unpack_dictionary(&self) -> Result<Dictionary> {
         Ok(self.decoder()?.dictionary().clone())
     }
@@ -75,7 +75,7 @@ impl Packed {
     /// interim change. Its Gaussians are the first ones of the file. `None` if there is one layer.
     ///
     /// # Errors
-    /// Those of [`Self::unpack`].
+    /// As [`Self::unpack`].
     pub fn first_layer(&self) -> Result<Option<Model>> {
         let Some(end) = self.decoder()?.index().first_layer_end() else { return Ok(None) };
         let data = usize::try_from(end).ok().and_then(|end| self.data().get(..end)).unwrap_or_default();

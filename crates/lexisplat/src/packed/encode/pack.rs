@@ -86,7 +86,7 @@ impl<S: Borrow<Splats>> Packer<S> {
     /// Gaussians keep a share of their own size, turn, opacity and colour (docs/METHOD.md, "The floor").
     ///
     /// # Errors
-    /// Those of [`Self::quantise`] and [`Quantised::finish`].
+    /// As [`Self::quantise`] and [`Quantised::finish`].
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
         self.quantise(step, true, progress)?.finish(None, None, progress)
     }

@@ -12,7 +12,7 @@ use crate::support::error::{Error, FormatError, Result};
 /// what a link of 10 Mbit/s brings in 3 ms.
 const SKIPPED: u64 = 4 << 10;
 
-/// What a file is decoded with, and its ranges.
+/// The decoder of a file, and its ranges.
 #[derive(Debug)]
 pub(super) struct Ranges {
     pub(super) head: PackedHead,

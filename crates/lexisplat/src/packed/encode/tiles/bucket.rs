@@ -37,7 +37,7 @@ impl<'p> BucketReader<'p> {
     /// Adds the Gaussians of the bucket that are among `rows` of tile `number`. Rows may come in any order.
     ///
     /// # Errors
-    /// Those of [`Plan::runs`].
+    /// As [`Plan::runs`].
     pub fn add(
         &mut self,
         number: usize,

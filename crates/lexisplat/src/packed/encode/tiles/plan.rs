@@ -238,7 +238,7 @@ impl Plan {
     /// `progress`.
     ///
     /// # Errors
-    /// Those of [`Survey::of`], and [`Error::Parameter`] if there is no such tile or it is not as it was when it was
+    /// As [`Survey::of`], and [`Error::Parameter`] if there is no such tile or it is not as it was when it was
     /// surveyed.
     pub fn runs(
         &self,
@@ -273,7 +273,7 @@ impl Plan {
     /// [`BucketReader::add_piece`]: super::BucketReader::add_piece
     ///
     /// # Errors
-    /// Those of [`Self::runs`].
+    /// As [`Self::runs`].
     pub fn scatter(
         &self,
         number: usize,
