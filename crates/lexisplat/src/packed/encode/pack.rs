@@ -20,7 +20,7 @@ use crate::support::maths::at_share;
 use crate::support::progress::Progress;
 
 /// Expected PSNR in dB at an overall step of `EXPECTED_STEP / sqrt(gaussians)`. This constant and the next three are fitted
-/// to held-out views of the models in docs/METHOD.md, which they miss by up to 3 dB.
+/// to held-out views of the models in docs/results, which they miss by up to 3 dB.
 const EXPECTED_DB: f64 = 40.0;
 const EXPECTED_STEP: f64 = 2.3e-3;
 /// Growth of the PSNR in dB when the step halves, and the growth of that growth.
