@@ -533,7 +533,7 @@ class Bench:
             self.row(path.name, *cells)
 
     def quality(self):
-        self.title("What a format costs", "model", "Gaussians", "format", "written by", "bytes", "seconds", "PSNR, dB: mean", "worst view")
+        self.title("Cost of a format", "model", "Gaussians", "format", "written by", "bytes", "seconds", "PSNR, dB: mean", "worst view")
         for name in self.args.quality:
             model = self.args.folder / f"{name}.ply"
             count = len(columns(model)["x"])

@@ -9,7 +9,7 @@
 FOLDER must be empty and takes the outputs, which are deleted again. Every way to compress is run undisturbed
 first; then it is killed at moments spread evenly at random over the time that took and a tenth more, in turn
 with no output there and with one to replace. Afterwards the output must be as before, or byte for byte what
-the undisturbed run made. A fifth of the outputs is then cut or has a bit flipped, at random places: `info`
+the undisturbed run made. A fifth of the outputs is then cut or has a bit flipped, at random offsets: `info`
 and `decompress` must refuse each. Linux and macOS.
 """
 

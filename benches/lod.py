@@ -36,10 +36,10 @@ def tile(model, copies, target):
     lines = data[:end].decode().splitlines()
     names = [line.split()[2] for line in lines if line.startswith("property float ")]
     rows = np.frombuffer(data[end:], "<f4").reshape(-1, len(names))
-    place, size = ([names.index(f"{stem}{k}") for k in of] for stem, of in (("", "xyz"), ("scale_", "012")))
-    least, most = np.quantile(rows[:, place], [0.05, 0.95], axis=0)
+    columns, size = ([names.index(f"{stem}{k}") for k in of] for stem, of in (("", "xyz"), ("scale_", "012")))
+    least, most = np.quantile(rows[:, columns], [0.05, 0.95], axis=0)
     sides = (most - least)[[0, 2]]
-    inside = ((rows[:, place] >= least) & (rows[:, place] <= most)).all(1)
+    inside = ((rows[:, columns] >= least) & (rows[:, columns] <= most)).all(1)
     kept = rows[inside & (np.exp(rows[:, size].max(1)) < sides.min() / 8)].copy()
     if target is None:
         return sides
@@ -49,8 +49,8 @@ def tile(model, copies, target):
         out.write(header)
         for copy in range(copies):
             moved = kept.copy()
-            moved[:, place[0]] += copy // side * sides[0]
-            moved[:, place[2]] += copy % side * sides[1]
+            moved[:, columns[0]] += copy // side * sides[0]
+            moved[:, columns[2]] += copy % side * sides[1]
             out.write(moved.tobytes())
     return sides
 
@@ -58,14 +58,14 @@ def tile(model, copies, target):
 def path(cameras, sides, copies, views):
     """Return cameras on a way through all copies, there and back along rows of the grid."""
     side = int(np.ceil(np.sqrt(copies)))
-    places = [divmod(copy, side) for copy in range(copies)]
-    places.sort(key=lambda place: (place[0], place[1] if place[0] % 2 == 0 else -place[1]))
+    cells = [divmod(copy, side) for copy in range(copies)]
+    cells.sort(key=lambda cell: (cell[0], cell[1] if cell[0] % 2 == 0 else -cell[1]))
     found = []
     for view in range(views):
         camera = dict(cameras[view % len(cameras)])
-        place = places[view * copies // views]
+        cell = cells[view * copies // views]
         x, y, z = camera["position"]
-        camera["position"] = [x + place[0] * float(sides[0]), y, z + place[1] * float(sides[1])]
+        camera["position"] = [x + cell[0] * float(sides[0]), y, z + cell[1] * float(sides[1])]
         camera.update(id=view, img_name=f"{view:04}")
         camera.pop("split", None)
         found.append(camera)

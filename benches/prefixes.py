@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the first bytes of packed files show: mean and least PSNR against the original over its cameras.
+"""PSNR of the first bytes of packed files: mean and least against the original over its cameras.
 
     python3 benches/prefixes.py FOLDER [--only NAME ...] [--shares 10 15 25 ...] [--binary LEXISPLAT] [-- OPTION ...]
 

@@ -108,8 +108,8 @@ def measure(binary, scorer, model, count, args):
         for peer in args.peer if cameras else []:
             name, command = peer.split("=", 1)
             encoded, decoded = Path(folder) / "encoded.bin", Path(folder) / f"{len(files)}.ply"
-            places = {"model": model, "encoded": encoded, "decoded": decoded}
-            done = subprocess.run([word.format(**places) for word in shlex.split(command)], capture_output=True, text=True)
+            paths = {"model": model, "encoded": encoded, "decoded": decoded}
+            done = subprocess.run([word.format(**paths) for word in shlex.split(command)], capture_output=True, text=True)
             if done.returncode:
                 print(f"{model.name}: {name}: {done.stderr.strip()[-200:]}", file=sys.stderr, flush=True)
                 continue

@@ -175,15 +175,15 @@ def peer_point(codec, scene, cache, sog):
         key = "-".join((scene.name, scene.digest, codec.name, version, codec.setting))
         return cache / re.sub(r"[^\w.-]+", "_", key)
 
-    place, version, ready = home(codec.version), codec.version, scene.path.with_suffix(".sog")
-    if codec.name == "SOG" and not sog and not place.exists():
+    folder, version, ready = home(codec.version), codec.version, scene.path.with_suffix(".sog")
+    if codec.name == "SOG" and not sog and not folder.exists():
         if not ready.exists():
             return None
         with zipfile.ZipFile(ready) as bundle:
             version = json.loads(bundle.read("meta.json")).get("asset", {}).get("generator", "?").split()[-1].lstrip("v")
         version += " (ready-made)"
-        place = home(version + hashlib.sha256(ready.read_bytes()).hexdigest()[:8])
-    if not place.exists():
+        folder = home(version + hashlib.sha256(ready.read_bytes()).hexdigest()[:8])
+    if not folder.exists():
         cache.mkdir(parents=True, exist_ok=True)
         # Made aside and renamed, so that a run cut short leaves nothing that looks finished.
         with tempfile.TemporaryDirectory(dir=cache) as aside:
@@ -200,8 +200,8 @@ def peer_point(codec, scene, cache, sog):
             decode, *_ = run(codec.decode(encoded, decoded))
             finite_opacity(decoded)
             (made / "seconds.json").write_text(json.dumps([encode, decode]))
-            made.rename(place)
-    return place / codec.file, place / "decoded.ply", *json.loads((place / "seconds.json").read_text()), version
+            made.rename(folder)
+    return folder / codec.file, folder / "decoded.ply", *json.loads((folder / "seconds.json").read_text()), version
 
 
 def scored(lexisplat, scene, codec, version, setting, encoded, decoded, encode, decode):

@@ -55,8 +55,8 @@ def presets(binary, folder):
     for model, count in models:
         cells, misses = [], []
         for name, aim in PRESETS.items():
-            with tempfile.TemporaryDirectory() as place:
-                file = Path(place) / "scene.lexi"
+            with tempfile.TemporaryDirectory() as folder:
+                file = Path(folder) / "scene.lexi"
                 run(binary, "compress", "--quiet", model, "-o", file, "--preset", name)
                 ratio, decibels = model.stat().st_size / file.stat().st_size, reached(binary, model, file)
             cells.append(f"{ratio:.1f}x, {decibels:.1f} dB")
@@ -68,9 +68,9 @@ def presets(binary, folder):
 
 
 def demo(binary, _):
-    with tempfile.TemporaryDirectory() as place:
-        run(binary, "demo", "--gaussians", DEMO, "--output", Path(place) / "demo", "--quiet")
-        scene, file = (Path(place) / "demo" / name for name in ("scene.ply", "scene.lexi"))
+    with tempfile.TemporaryDirectory() as folder:
+        run(binary, "demo", "--gaussians", DEMO, "--output", Path(folder) / "demo", "--quiet")
+        scene, file = (Path(folder) / "demo" / name for name in ("scene.ply", "scene.lexi"))
         size, decibels = file.stat().st_size, reached(binary, scene, file)
         ratio = scene.stat().st_size / size
     return f"`lexisplat demo --gaussians {DEMO}` makes a file of {size:,} bytes, {ratio:.1f} times smaller than the PLY, of {decibels:.1f} dB."

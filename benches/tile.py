@@ -37,8 +37,8 @@ def main():
         out.write(header)
         for copy in range(copies):
             moved = array.array("f", values)
-            for column, step, place in zip(columns, pitch, divmod(copy, side)):
-                shift = step * place
+            for column, step, index in zip(columns, pitch, divmod(copy, side)):
+                shift = step * index
                 for at in range(column, len(moved), width):
                     moved[at] += shift
             moved.tofile(out)

@@ -1,4 +1,4 @@
-# What fuzz/run and fuzz/long share. Both change to this folder before they read it.
+# Functions that fuzz/run and fuzz/long share. Both change to this folder before they read it.
 
 all_targets=(packed feed lexi ply entropy scene dictionary colmap transforms cameras_json
   spz sog compressed_ply splat ksplat gltf)

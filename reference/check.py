@@ -55,7 +55,7 @@ class File:
         self.spans = {k: v["data_offsets"] for k, v in self.header.items() if k != "__metadata__"}
 
     def ranges(self):
-        """Return places of the CRC-32s in the head, and begins and ends of ranges in the data; and
+        """Return offsets of the CRC-32s in the head, and begins and ends of ranges in the data; and
         the numbers from origin to dc_turn."""
         begin, end = self.spans["packed.head"]
         head, at = bytes(self.data[begin:end]), 4
@@ -82,7 +82,7 @@ class File:
         layers, is_sorted = head[at] & 127, head[at] >> 7
         finer = head[at + 1 : at + 1 + layers]
         at += 1 + layers
-        count, total, found, place = varint(), 0, [], self.spans["packed.data"][0]
+        count, total, found, offset = varint(), 0, [], self.spans["packed.data"][0]
         for _ in range(count):
             layer, at = head[at], at + 1
             varint(), varint()
@@ -93,8 +93,8 @@ class File:
                 varint()
                 at += 1
             size = varint()
-            found.append((begin + at, place, place + size))
-            at, place = at + 8, place + size
+            found.append((begin + at, offset, offset + size))
+            at, offset = at + 8, offset + size
         return found, grid
 
     def seal(self):
@@ -225,8 +225,8 @@ class Comparison:
         if "packed.head" in file.spans:
             grid = file.ranges()[1]
             products = least_products(ours, rest, grid[5:8], grid[8:])
-            mean, places = grid[5:8], np.stack([ours[k].astype(np.float64) for k in "xyz"], 1) - offset
-            cells = (places - grid[:3]) / grid[3]
+            mean, positions = grid[5:8], np.stack([ours[k].astype(np.float64) for k in "xyz"], 1) - offset
+            cells = (positions - grid[:3]) / grid[3]
             way = np.sqrt((((cells - np.floor(cells) - 0.5) * grid[3]) ** 2).sum(1))
         else:
             mean = None
@@ -238,7 +238,7 @@ class Comparison:
                 continue
             if name in ("x", "y", "z"):                 # moves together are at least as long as the way to a centre
                 k = "xyz".index(name)                   # with an offset, positions are sums in f64
-                bound = 2.0**-23 * abs(places[:, k]) + 2.0**-20 * way + (2.0**-52 * abs(a) if any(offset) else 0)
+                bound = 2.0**-23 * abs(positions[:, k]) + 2.0**-20 * way + (2.0**-52 * abs(a) if any(offset) else 0)
             elif name == "opacity":
                 bound = 2.0**-20 * np.maximum(1, abs(a))
             elif name.startswith("f_dc_"):

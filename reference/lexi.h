@@ -52,7 +52,7 @@ typedef struct lexi_limits {
    itself opens a first part, and sets `bytes` (of `length`) as they come in, in any order. They have to stay there. */
 typedef struct lexi_range {
     int what, number;            /* LEXI_BASE; LEXI_FINER 1 to 2; LEXI_PART 0 to 2; LEXI_INTERIM */
-    uint64_t start;              /* place in the file */
+    uint64_t start;              /* offset in the file */
     uint32_t length, crc, integers_crc;
     const unsigned char *bytes;
 } lexi_range;
@@ -98,7 +98,7 @@ typedef struct lexi_scene {
     float *normal;               /* 3 a row; NULL if the file has none */
     int d;
     float *sh_rest;              /* LEXI_DENSE: d a row */
-    size_t *code_first;          /* LEXI_SPARSE: the first of a Gaussian's places in `atom` and `value`, ... */
+    size_t *code_first;          /* LEXI_SPARSE: the first of a Gaussian's entries in `atom` and `value`, ... */
     uint8_t *code_count;         /* ... and their number; or LEXI_EXACT, code_first is then a row of exact_rows */
     size_t code_total, exact_total;
     uint16_t *atom;              /* ascending within a Gaussian */
@@ -576,7 +576,7 @@ static int lexi__number(lexi__call *call, lexi__text t, double *x) {
 typedef struct {
     lexi__text name;
     int type, rank, known;
-    uint64_t shape[2], count, begin, end; /* the first two numbers of the shape; elements; places behind the header */
+    uint64_t shape[2], count, begin, end; /* the first two numbers of the shape; elements; offsets behind the header */
 } lexi__tensor;
 
 typedef struct {
@@ -1050,11 +1050,11 @@ static int lexi__open_plain(lexi__call *call, lexi_file *f) {
     return 1;
 }
 
-/* ---- Words of 16 bits: bits with odds, and lanes of symbols ---- */
+/* ---- Words of 16 bits: adaptive bits, and lanes of symbols ---- */
 
 typedef struct { const unsigned char *p; size_t words, next; uint32_t state; } lexi__coder;
-typedef struct { uint16_t zero; uint8_t seen; } lexi__odds;
-enum { LEXI__EITHER = 18 }; /* odds of `either`: nonzero, negative, lengths[16] */
+typedef struct { uint16_t zero; uint8_t seen; } lexi__bit_model;
+enum { LEXI__EITHER = 18 }; /* models of `either`: nonzero, negative, lengths[16] */
 
 static int lexi__start(lexi__coder *c, const unsigned char *p, size_t words) {
     c->p = p;
@@ -1081,13 +1081,12 @@ static int lexi__split(lexi__coder *c, uint32_t p) {
     return b;
 }
 
-static int lexi__bit(lexi__coder *c, lexi__odds *odds) {
+static int lexi__bit(lexi__coder *c, lexi__bit_model *model) {
     static const uint8_t rates[6] = {1, 2, 3, 4, 4, 5};
-    int b = lexi__split(c, odds->zero), rate = rates[odds->seen];
-    odds->zero =
-        (uint16_t)lexi__clamp(b ? odds->zero - (odds->zero >> rate) : odds->zero + ((4096 - odds->zero) >> rate), 48,
-                              4048);
-    if (odds->seen < 5) odds->seen++;
+    int b = lexi__split(c, model->zero), rate = rates[model->seen];
+    model->zero = (uint16_t)lexi__clamp(
+        b ? model->zero - (model->zero >> rate) : model->zero + ((4096 - model->zero) >> rate), 48, 4048);
+    if (model->seen < 5) model->seen++;
     return b;
 }
 
@@ -1097,22 +1096,22 @@ static int32_t lexi__even(lexi__coder *c, int n) {
     return x;
 }
 
-static int32_t lexi__positive(lexi__coder *c, lexi__odds *list, int length) {
+static int32_t lexi__positive(lexi__coder *c, lexi__bit_model *list, int length) {
     int n = 1;
     while (n < length && lexi__bit(c, &list[n])) n++;
     return (int32_t)1 << (n - 1) | lexi__even(c, n - 1);
 }
 
-static int32_t lexi__either(lexi__coder *c, lexi__odds *odds) {
+static int32_t lexi__either(lexi__coder *c, lexi__bit_model *models) {
     int negative;
-    if (!lexi__bit(c, &odds[0])) return 0;
-    negative = lexi__bit(c, &odds[1]);
-    int32_t x = lexi__positive(c, odds + 2, 16);
+    if (!lexi__bit(c, &models[0])) return 0;
+    negative = lexi__bit(c, &models[1]);
+    int32_t x = lexi__positive(c, models + 2, 16);
     return negative ? -x : x;
 }
 
-static void lexi__even_odds(lexi__odds *odds, size_t n) {
-    for (size_t i = 0; i < n; i++) { odds[i].zero = 2048; odds[i].seen = 0; }
+static void lexi__even_models(lexi__bit_model *models, size_t n) {
+    for (size_t i = 0; i < n; i++) { models[i].zero = 2048; models[i].seen = 0; }
 }
 
 /* ---- packed.head ---- */
@@ -1161,7 +1160,7 @@ static int lexi__read_integers(lexi__call *call, lexi__head *h, const unsigned c
     static const uint8_t sizes[15] = {1, 3, 9, 3, 9, 7, 7, 7, 7, 7, 6, 5, 4},
                          zeros[13] = {2, 2, 4, 2, 4, 2, 2, 4, 4, 4, 4, 4, 4};
     lexi__coder c;
-    lexi__odds odds[LEXI__EITHER];
+    lexi__bit_model models[LEXI__EITHER];
     list[count++] = &h->cell_log;
     for (int which = 0; which < 2; which++) {
         int32_t(*rows)[4] = which ? h->move : h->turn;
@@ -1174,9 +1173,9 @@ static int lexi__read_integers(lexi__call *call, lexi__head *h, const unsigned c
     if (n % 2 || !lexi__start(&c, p, n / 2))
         return lexi__refuse(call, "packed.head, integers", "they are no words with a first state of at least 2^16");
     for (int group = 0, i = 0; group < 13; group++) {
-        lexi__even_odds(odds, LEXI__EITHER);
+        lexi__even_models(models, LEXI__EITHER);
         for (int k = 0; k < sizes[group]; k++, i++) {
-            int32_t x = lexi__either(&c, odds) * (1 << zeros[group]);
+            int32_t x = lexi__either(&c, models) * (1 << zeros[group]);
             if (x < -32768 || x > 32767)
                 return lexi__damaged(call, "packed.head, integers", "number % is %, beyond 16 bits", i, x);
             *list[i] = x;
@@ -1211,16 +1210,16 @@ static void lexi__make_table(lexi__table *t, int w, int symbols, const uint8_t *
 /* Check 11. Sets 51 to 53 are those of Atom0 to Atom2. */
 static int lexi__read_tables(lexi__call *call, lexi_file *f, const unsigned char *p, size_t n) {
     lexi__coder c;
-    lexi__odds used[2], many, same[2], newer, counts[10], present[2], delta[LEXI__EITHER];
+    lexi__bit_model used[2], many, same[2], newer, counts[10], present[2], delta[LEXI__EITHER];
     size_t count = 0, room = 0;
     int has = 0;
-    lexi__even_odds(used, 2);
-    lexi__even_odds(&many, 1);
-    lexi__even_odds(same, 2);
-    lexi__even_odds(&newer, 1);
-    lexi__even_odds(counts, 10);
-    lexi__even_odds(present, 2);
-    lexi__even_odds(delta, LEXI__EITHER);
+    lexi__even_models(used, 2);
+    lexi__even_models(&many, 1);
+    lexi__even_models(same, 2);
+    lexi__even_models(&newer, 1);
+    lexi__even_models(counts, 10);
+    lexi__even_models(present, 2);
+    lexi__even_models(delta, LEXI__EITHER);
     if (n % 2 || !lexi__start(&c, p, n / 2))
         return lexi__refuse(call, "packed.head, tables", "they are no words with a first state of at least 2^16");
     for (int set = 0; set < 61; set++) {
@@ -1267,12 +1266,12 @@ static int lexi__read_tables(lexi__call *call, lexi_file *f, const unsigned char
 static int lexi__read_dictionary(lexi__call *call, lexi_file *f, int fixed, const unsigned char *p, size_t n) {
     const double s = 0.5773502691896257, t = 0.7071067811865476, u = 0.4082482904638631, v = 0.8164965809277261;
     size_t d = (size_t)f->info.d, third = d / 3, learned = (size_t)f->info.m - (fixed ? d : 0);
-    lexi__odds odds[4][3][5][LEXI__EITHER];
+    lexi__bit_model models[4][3][5][LEXI__EITHER];
     lexi__coder c;
     if (!learned && n)
         return lexi__damaged(call, "packed.head, dictionary", "it has % bytes, but no atom is learned", n, 0);
     if (!lexi__resize(call, &f->dictionary, 0, (uint64_t)f->info.m * d, sizeof(float))) return 0;
-    lexi__even_odds(odds[0][0][0], sizeof odds / sizeof(lexi__odds));
+    lexi__even_models(models[0][0][0], sizeof models / sizeof(lexi__bit_model));
     if (learned && (n % 2 || !lexi__start(&c, p, n / 2)))
         return lexi__refuse(call, "packed.head, dictionary", "it is no words with a first state of at least 2^16");
     for (size_t i = 0; i < learned; i++) {
@@ -1282,7 +1281,7 @@ static int lexi__read_dictionary(lexi__call *call, lexi_file *f, int fixed, cons
             int32_t(*now)[3] = &x[k + 2];
             for (int a = 0; a < 3; a++) {
                 uint32_t near = lexi__abs(now[-1][a]) + (a ? lexi__abs(now[0][0]) >> 1 : lexi__abs(now[-2][0]));
-                now[0][a] = lexi__either(&c, odds[k < 3    ? 0
+                now[0][a] = lexi__either(&c, models[k < 3    ? 0
                                                   : k < 8  ? 1
                                                   : k < 15 ? 2
                                                            : 3][a][lexi__min(lexi__bitlength(near), 4)]);
@@ -1925,13 +1924,13 @@ static int lexi__evaluate(lexi__work *x, const lexi__gaussian *g, int lack, int 
     rotation[3] = (float)(g->needle ? (Z - W - X + Y) / 2 : Z);
     for (int k = 0; k < 3; k++) moves[k] = lexi__multiply(H, g->count[7 + k]) * exp2(g->move_log[k] / 512.0);
     for (int n = 0; n < 3; n++) {
-        double place = h->origin[n] + (g->cell[n] + 0.5) * h->side;
+        double coordinate = h->origin[n] + (g->cell[n] + 0.5) * h->side;
         dc[n] = h->dc_mean[n];
         for (int k = 0; k < 3; k++) {
-            place += moves[k] * axes[k][n];
+            coordinate += moves[k] * axes[k][n];
             dc[n] += values[4 + k] * h->dc_unit * h->dc_axes[k][n];
         }
-        position[n] = lexi__round(place);
+        position[n] = lexi__round(coordinate);
         if (!lexi__finite(position[n])) return lexi__range_refuse(x, "a position is not finite");
     }
     return 1;
@@ -2050,17 +2049,17 @@ static int lexi__packed_sh(lexi__work *x, const lexi__gaussian *g, int parts, si
     }
     for (int p = 0; p < parts && !g->exact; p++)
         for (int k = 0; k < g->nonzeros[p]; k++, used[p]++) {
-            int place = n++;
+            int slot = n++;
             uint16_t atom = x->atoms[p][used[p]];
             float product = (float)x->sizes[p][used[p]] * step;
-            for (; place > 0 && atoms[place - 1] >= atom; place--) {
-                if (atoms[place - 1] == atom) return lexi__range_fail(x, "a Gaussian has atom % twice", atom, 0);
-                atoms[place] = atoms[place - 1];
-                values[place] = values[place - 1];
+            for (; slot > 0 && atoms[slot - 1] >= atom; slot--) {
+                if (atoms[slot - 1] == atom) return lexi__range_fail(x, "a Gaussian has atom % twice", atom, 0);
+                atoms[slot] = atoms[slot - 1];
+                values[slot] = values[slot - 1];
             }
-            atoms[place] = atom;
-            values[place] = lexi__to_half(product);
-            if (!lexi__finite(values[place])) return lexi__range_refuse(x, "an SH value is not finite in f16");
+            atoms[slot] = atom;
+            values[slot] = lexi__to_half(product);
+            if (!lexi__finite(values[slot])) return lexi__range_refuse(x, "an SH value is not finite in f16");
         }
     for (int k = 0; k < n; k++) lexi__add_atom(sh_rest, f->dictionary + (size_t)atoms[k] * (size_t)d, values[k], d);
     for (int k = 0; k < d; k++)
@@ -2368,7 +2367,7 @@ static int lexi__numbers(lexi__cursor *c, unsigned char *out, unsigned char *pla
 }
 
 static int lexi__block(lexi__cursor *c, unsigned char *out, unsigned char *planes, unsigned char *palette,
-                       unsigned char *places, size_t n, size_t w) {
+                       unsigned char *indices, size_t n, size_t w) {
     uint32_t filter = c->p < c->end ? c->p[0] : 255;
     if (filter && filter != 4) return lexi__numbers(c, out, planes, n, w);
     c->p++;
@@ -2379,12 +2378,12 @@ static int lexi__block(lexi__cursor *c, unsigned char *out, unsigned char *plane
     }
     size_t colours = lexi__fixed(c, "a palette", 2) + 1, size = colours <= 256 ? 1 : 2;
     if (colours > n) lexi__bad(c, "a palette", "has more values than the block has rows");
-    if (c->why || !lexi__numbers(c, palette, planes, colours, w) || !lexi__numbers(c, places, planes, n, size))
+    if (c->why || !lexi__numbers(c, palette, planes, colours, w) || !lexi__numbers(c, indices, planes, n, size))
         return 0;
     for (size_t i = 0; i < n; i++) {
-        size_t place = size == 1 ? places[i] : lexi__u16(places + 2 * i);
-        if (place >= colours) { lexi__bad(c, "a palette", "has no value for a row"); return 0; }
-        memcpy(out + i * w, palette + place * w, w);
+        size_t index = size == 1 ? indices[i] : lexi__u16(indices + 2 * i);
+        if (index >= colours) { lexi__bad(c, "a palette", "has no value for a row"); return 0; }
+        memcpy(out + i * w, palette + index * w, w);
     }
     return 1;
 }
@@ -2447,7 +2446,7 @@ void lexi_free_extra(lexi_extra *extra) {
     memset(extra, 0, sizeof *extra);
 }
 
-/* Move row k of n to place order[k]. */
+/* Move row k of n to index order[k]. */
 static int lexi__move_rows(lexi__call *call, void *pointer, const uint32_t *order, size_t n, size_t width) {
     unsigned char *moved = NULL, *rows;
     uint64_t left = call->left;

@@ -323,11 +323,11 @@ def decode_plain(t, layout, d):
 
 # The layout packed
 
-def decode_packed(t, meta, d, header, places, beginning, trace):
+def decode_packed(t, meta, d, header, offsets, beginning, trace):
     n = int(meta["gaussians"])
-    check(n <= 3 * (header + max(end for _, end in places.values())), "more Gaussians than the file has room for")
+    check(n <= 3 * (header + max(end for _, end in offsets.values())), "more Gaussians than the file has room for")
     data = t.take("packed.data", "U8", (None,)).tobytes()
-    begin, end = places["packed.data"]
+    begin, end = offsets["packed.data"]
     head = lexi3.Head(t.take("packed.head", "U8", (None,)).tobytes(), n, end - begin, d)
     rows = None if beginning else n                      # a first part has no columns
     order = t.column("packed.order", rows) if "packed.order" in t.left else None
@@ -354,18 +354,18 @@ def decode(data, beginning=False, trace=None):
     lexi3.Trace, for packed files.
     """
     with np.errstate(all="ignore"):
-        meta, tensors, head, places = read_container(data, beginning)
-        beginning = len(data) < len(head) + max((end for _, end in places.values()), default=0)
+        meta, tensors, head, offsets = read_container(data, beginning)
+        beginning = len(data) < len(head) + max((end for _, end in offsets.values()), default=0)
         version, layout = check_version(meta)
         packed = version == PACKED
         check(packed or not beginning, "only packed files can be decoded in part")
         check(packed or trace is None, "only packed files can be traced")
-        check_sums(meta, tensors, head, version, set(places))
+        check_sums(meta, tensors, head, version, set(offsets))
         degree = check_packed_metadata(meta) if packed else check_metadata(meta)
         d = 3 * ((degree + 1) ** 2 - 1)
         t = Tensors(tensors)
         if packed:
-            return meta, decode_packed(t, meta, d, len(head), places, beginning, trace)
+            return meta, decode_packed(t, meta, d, len(head), offsets, beginning, trace)
         t.left.pop("checksum.header")
         out = decode_plain(t, layout, d)
         t.finish()
@@ -373,7 +373,7 @@ def decode(data, beginning=False, trace=None):
 
 
 def in_source_order(out):
-    """Move Gaussian k, with its extras, to place order[k]."""
+    """Move Gaussian k, with its extras, to index order[k]."""
     if "order" not in out:
         return out
     back = np.argsort(out["order"])

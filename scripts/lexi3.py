@@ -81,22 +81,22 @@ class Bytes:
         return self.at == len(self.data)
 
 
-# Bits with odds: integers, tables and dictionary
+# Adaptive bits: integers, tables and dictionary
 
-class Odds:
+class BitModel:
     def __init__(self):
         self.zero, self.seen = 2048, 0
 
 
-def odds(*shape):
-    return [odds(*shape[1:]) for _ in range(shape[0])] if shape else Odds()
+def models(*shape):
+    return [models(*shape[1:]) for _ in range(shape[0])] if shape else BitModel()
 
 
-def either_odds():
-    return odds(), odds(), odds(16)
+def either_models():
+    return models(), models(), models(16)
 
 
-class OddBits:
+class AdaptiveBits:
     def __init__(self, data, what):
         self.what = what
         check(len(data) % 2 == 0, f"the {what} are not of whole words")
@@ -162,10 +162,10 @@ class Tables:
     """For each number of 0 to 2^w - 1, and each table, the symbol and what becomes of the state."""
 
     def __init__(self, data):
-        bits = OddBits(data, "tables")
-        self.used, self.many, self.same, self.new = odds(2), odds(), odds(2), odds()
-        self.counts, self.present, self.delta = odds(10), odds(2), either_odds()
-        self.place = np.full(len(SETS) * 24, -1, I)     # where the table of a context begins, -1 if there is none
+        bits = AdaptiveBits(data, "tables")
+        self.used, self.many, self.same, self.new = models(2), models(), models(2), models()
+        self.counts, self.present, self.delta = models(10), models(2), either_models()
+        self.start = np.full(len(SETS) * 24, -1, I)     # where the table of a context begins, -1 if there is none
         p, rest, symbol = [], [], []
         at = before = 0
         for number, stream in enumerate(SETS):
@@ -179,7 +179,7 @@ class Tables:
                 p.append(np.repeat(probability, probability))
                 symbol.append(np.repeat(np.arange(len(probability)), probability))
                 rest.append(np.arange(1 << w) - np.repeat(np.cumsum(probability) - probability, probability))
-            self.place[number * 24:number * 24 + 24] = at + (np.array(table_of) << w)
+            self.start[number * 24:number * 24 + 24] = at + (np.array(table_of) << w)
             at += count << w
         bits.finish()
         self.p, self.rest, self.symbol = (np.concatenate(x or [[0]]).astype(I) for x in (p, rest, symbol))
@@ -217,8 +217,8 @@ class Tables:
 def read_dictionary(data, m, d, fixed):
     learned, n, atoms = m - d if fixed else m, d // 3, np.zeros((m, d), F)
     check(learned or not data, "the dictionary is not empty, though no atom is learned")
-    bits = OddBits(data, "numbers of the dictionary") if learned else None
-    o = [[[either_odds() for _ in range(5)] for _ in range(3)] for _ in range(4)]
+    bits = AdaptiveBits(data, "numbers of the dictionary") if learned else None
+    o = [[[either_models() for _ in range(5)] for _ in range(3)] for _ in range(4)]
     for atom in atoms[:learned]:
         x = [[0, 0, 0] for _ in range(n)]
         for k in range(n):
@@ -284,10 +284,10 @@ class Head:
         check(b.end(), "bytes of the head are left")
 
     def read_integers(self, data):
-        bits = OddBits(data, "integers")
+        bits = AdaptiveBits(data, "integers")
 
         def group(count, zeros):
-            o = either_odds()
+            o = either_models()
             values = [bits.either(o) << zeros for _ in range(count)]
             check(all(-1 << 15 <= x < 1 << 15 for x in values), "one of the integers is not from -32768 to 32767")
             return np.array(values, I)
@@ -429,11 +429,11 @@ class Lanes:
 
     def symbol(self, stream, context, who):
         sets = self.set[who] + stream * 24 if stream < 16 else (stream + 32) * 24
-        place = self.tables.place[sets + context]
-        check(place.size == 0 or place.min() >= 0, "a context has no table")
+        start = self.tables.start[sets + context]
+        check(start.size == 0 or start.min() >= 0, "a context has no table")
         w = 12 if ATOM <= stream < ATOM + 3 else 10
         state = self.state[who]
-        slot = place + (state & (1 << w) - 1)
+        slot = start + (state & (1 << w) - 1)
         self.put((state >> w) * self.tables.p.take(slot) + self.tables.rest.take(slot), who)
         symbol = self.tables.symbol.take(slot)
         if len(self.traced):
@@ -753,8 +753,8 @@ def part_rows(head, p, out):
     ends = np.concatenate([[0], np.cumsum(1 + np.where(exact, head.d, 2 * count))])
     values = np.zeros(ends[-1], I)
     values[ends[:-1]] = np.where(exact, -1, count)
-    place = ends[who] + 1 + 2 * (np.arange(len(who)) - (np.cumsum(count) - count)[who])
-    values[place], values[place + 1] = atom, size
+    at = ends[who] + 1 + 2 * (np.arange(len(who)) - (np.cumsum(count) - count)[who])
+    values[at], values[at + 1] = atom, size
     for g, row in out.rows.items() if p == 0 else ():
         values[ends[g] + 1:ends[g + 1]] = row.view("<i4")
     return ends, values
@@ -862,9 +862,9 @@ def sh_rest(head, out, there):
             value = (size.astype(F) * steps[out.colour[who]]).astype(np.float16).astype(F)
         check(np.isfinite(value).all(), "a value is not finite")
         # The k-th nonzeros of all Gaussians together: each product and each sum is rounded to f32.
-        place = np.arange(len(who)) - (np.cumsum(count) - count)[who]
+        rank = np.arange(len(who)) - (np.cumsum(count) - count)[who]
         for k in range(int(count.max(initial=0))):
-            at = np.flatnonzero(place == k)
+            at = np.flatnonzero(rank == k)
             rest[who[at]] += value[at, None] * head.atoms[atom[at]]
         for g, row in out.rows.items():
             rest[g] = row.view("<f4")
@@ -908,9 +908,9 @@ def read_block(b, n, w):
         size = b.unpack("H")[0] + 1
         check(size <= n, "C of a palette is above n")
         palette = numbers(b, b.u8(), size, w)
-        places = numbers(b, b.u8(), n, 1 if size <= 256 else 2)
-        check((places < size).all(), "a place of a palette is not below C")
-        values = palette[places.astype(I)]
+        indices = numbers(b, b.u8(), n, 1 if size <= 256 else 2)
+        check((indices < size).all(), "an index of a palette is not below C")
+        values = palette[indices.astype(I)]
     else:
         values = numbers(b, how, n, w)
     check(b.end(), "bytes follow what is in a block")

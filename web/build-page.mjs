@@ -2,7 +2,7 @@
 //
 //   node build-page.mjs [--out FILE]        writes FILE, or ../crates/lexisplat-cli/assets/viewer.html.gz; gzipped if it ends so
 //
-// It needs esbuild, from the folder of node_modules that LEXISPLAT_NPM names or from the one beside this file. What is
+// It needs esbuild, from the folder of node_modules that LEXISPLAT_NPM names or from the one beside this file. The words that are
 // replaced in the written file to give it a scene is said at the head of src/viewer/page.html.
 
 import { createHash } from 'node:crypto';
@@ -15,7 +15,7 @@ import { gzipSync } from 'node:zlib';
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
 const OUT = here('../crates/lexisplat-cli/assets/viewer.html.gz');
-// What browsers with WebGPU understand.
+// The newest JavaScript that all browsers with WebGPU understand.
 const TARGET = 'es2022';
 // Each is in the page once, so that a scene can be put in by replacing text.
 const MARKERS = [

@@ -16,7 +16,7 @@ const root = dirname(web);
 const target = process.env.CARGO_TARGET_DIR ?? join(root, 'target');
 const modules = process.env.LEXISPLAT_NPM ?? join(web, 'node_modules');
 
-/** What a build asks of the engine; every browser with WebGPU has it, and Node since version 16. */
+/** The features of WebAssembly that a build needs; every browser with WebGPU has it, and Node since version 16. */
 const FEATURES = '-Ctarget-feature=+simd128,+bulk-memory,+nontrapping-fptoint,+sign-ext,+mutable-globals';
 /** The same for wasm-opt, and what wasm-bindgen uses. All its features at once make files that engines do not read yet. */
 const ENABLED = ['simd', 'bulk-memory', 'bulk-memory-opt', 'nontrapping-float-to-int', 'sign-ext', 'mutable-globals', 'reference-types', 'multivalue'].map((f) => `--enable-${f}`);

@@ -14,7 +14,7 @@ import { fileURLToPath } from 'node:url';
 const SOURCES = fileURLToPath(new URL('./src/', import.meta.url));
 /** An address of a file beside a module. */
 const ADDRESS = /new URL\('(\.[^']+)', import\.meta\.url\)/g;
-/** What names such a file in the bundle. */
+/** The name of such a file in the bundle. */
 const PART = 'lexisplat-part';
 
 /** @returns {import('esbuild').Plugin} */

@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 
 /// A camera takes some 100 bytes and its text as many; lists grow by doubling.
 const PER_BYTE: usize = 64;
-/// What an error and its text take.
+/// Bytes of an error and its text.
 const BASE: usize = 64 << 10;
 
 fuzz_target!(|data: &[u8]| {

@@ -69,7 +69,7 @@ fn give(feed: &mut LexiFeed, bytes: &[u8], at: usize, most: u64) -> bool {
     assert!(after <= most.max(FIRST_BYTES), "{after} bytes held, {most} allowed");
     if let Err(error) = &result {
         assert!(error.to_string().contains(NAME), "{error}");
-        // What is too much is not taken.
+        // Bytes beyond the limit are not taken.
         assert!(!matches!(error, Error::Limit { .. }) || after <= before.max(FIRST_BYTES), "{error}");
     }
     result.is_ok()
@@ -158,7 +158,7 @@ fn step(feed: &mut LexiFeed, file: &[u8], script: &Script<'_>, most: u64) {
     }
 }
 
-/// What the reader of first bytes makes of `first`, as the options ask for.
+/// Reads the first bytes `first`, as the options ask for.
 fn reader<'f>(first: &'f [u8], options: &FeedOptions) -> Result<LexiReader<'f>, Error> {
     let reader = LexiReader::open_first(NAME, first, &limits())?.with_sh_parts(options.sh_parts)?;
     if options.verify_integers { reader.with_integers_verified() } else { Ok(reader) }
@@ -213,7 +213,7 @@ fn run(file: &[u8], script: &Script<'_>, options: &FeedOptions) {
         {
             match reader(data, options) {
                 Ok(reader) => compare(&feed, &reader),
-                // What the head is in may follow the ranges.
+                // The bytes of the head may follow the ranges.
                 Err(Error::Limit { .. } | Error::Format { problem: FormatError::Truncated { .. }, .. }) => {}
                 Err(error) => assert!(is_of_others(&error.to_string()), "only a feed takes it: {error}"),
             }
@@ -229,7 +229,7 @@ fn first(file: &[u8], options: &FeedOptions) {
     let mut feed = LexiFeed::new(NAME, &options, &limits());
     let fed = feed.feed(0, file);
     match (feed.head().is_some(), reader(file, &options)) {
-        // What is damaged is dropped, and what is there is decoded.
+        // Damaged ranges are dropped, and the others are decoded.
         (true, Ok(_)) if fed.is_err() => {}
         (true, Ok(reader)) => compare(&feed, &reader),
         (false, Ok(_)) => assert!(fed.is_err_and(|e| e.to_string().contains("range without bytes"))),
@@ -244,7 +244,7 @@ fuzz_target!(init: one_thread(), |data: &[u8]| {
     let script = Script { bytes: script, taken: Cell::new(0) };
     let options = script.options(file.len());
     let most = usize::try_from(options.most_bytes).unwrap_or(usize::MAX);
-    // What came before it is known what it is may come again and again.
+    // Bytes that come before their meaning is known may come again and again.
     let held = STEPS.saturating_mul(file.len()).min(most);
     bounded(&data[..held.min(data.len())], PER_BYTE, BASE, || run(file, &script, &options));
     let some = &file[..script.below(file.len() + 1)];

@@ -10,7 +10,7 @@ use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 
 /// Tensors are copied and converted; a JSON header takes many times its bytes as it is parsed.
 const PER_BYTE: usize = 128;
-/// What is rounded up.
+/// Bytes for rounding up.
 const BASE: usize = 1 << 20;
 
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {

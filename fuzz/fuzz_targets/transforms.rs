@@ -7,7 +7,7 @@ use libfuzzer_sys::fuzz_target;
 
 /// A frame takes some 500 bytes and its text at least 60; lists grow by doubling.
 const PER_BYTE: usize = 64;
-/// What an error and its text take.
+/// Bytes of an error and its text.
 const BASE: usize = 64 << 10;
 
 fuzz_target!(|data: &[u8]| {

@@ -247,7 +247,7 @@ impl Parts {
         self.metadata.insert("gaussians".to_owned(), Value::from(gaussians.to_string()));
     }
 
-    /// Degree, and places of head and data of a packed scene.
+    /// Degree, and offsets of head and data of a packed scene.
     fn packed(&self) -> Option<(ShDegree, [usize; 2])> {
         let degree = self.metadata.get("degree")?.as_str()?.parse().ok()?;
         let at = |name: &str| self.tensors.iter().position(|tensor| tensor.name == name);

@@ -1,4 +1,4 @@
-//! What must hold of a file of another program's format, whatever its bytes.
+//! Rules for files of other programs' formats, whatever their bytes.
 
 use std::sync::Mutex;
 

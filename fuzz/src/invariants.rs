@@ -1,4 +1,4 @@
-//! What must hold of anything that a reader accepted.
+//! Rules for every scene that a reader accepted.
 
 use lexisplat::lexi::LexiWriter;
 use lexisplat::{CodeLayout, Geometry, Indices, Model, Silent, SparseCodes, Splats, lexi, ply};

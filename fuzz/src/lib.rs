@@ -1,5 +1,5 @@
-//! What the fuzz targets share: a memory bound, limits as a product sets them, mutations of .lexi files
-//! whose checksums fit, and what must hold of anything that was read.
+//! Parts that the fuzz targets share: a memory bound, limits as a product sets them, mutations of .lexi files
+//! whose checksums fit, and rules for everything that was read.
 
 #[allow(dead_code, reason = "the tests of the codec use more of it")]
 pub mod allocator;
@@ -11,7 +11,7 @@ pub mod parts;
 
 use lexisplat::Limits;
 
-/// What a careful product would let a file of unknown origin ask for.
+/// Returns the limits of a careful product for files of unknown origin.
 #[must_use]
 pub fn limits() -> Limits {
     let mut limits = Limits::default();

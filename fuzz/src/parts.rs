@@ -86,11 +86,11 @@ pub fn lexi(data: &[u8], at_once: usize, whole: Result<&Model, &Error>, [per_byt
             assert_eq!((part.record(), part.meta()), (whole.record(), whole.meta()));
             assert_eq!(part.dictionary(), whole.dictionary());
             let range = start..start + part.len();
-            let places = match chunks.order_kept() {
-                true => chunks.order(range)?.into_iter().map(|place| place as usize).collect(),
+            let indices = match chunks.order_kept() {
+                true => chunks.order(range)?.into_iter().map(|index| index as usize).collect(),
                 false => range.collect::<Vec<usize>>(),
             };
-            places.into_iter().enumerate().for_each(|(k, j)| same_coded(&part, k, whole, j));
+            indices.into_iter().enumerate().for_each(|(k, j)| same_coded(&part, k, whole, j));
             Ok(())
         })?;
         Ok::<_, Error>((chunks, seen))
@@ -170,7 +170,7 @@ fn same(a: &[f32], b: &[f32]) {
     assert!(a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits())), "{a:?} is not {b:?}");
 }
 
-/// Which type, and the bits of value `i`.
+/// Returns the number of the type, and the bits of value `i`.
 fn bits(values: &ExtraValues, i: usize) -> (u8, u64) {
     match values {
         ExtraValues::I8(v) => (0, u64::from(v[i].cast_unsigned())),

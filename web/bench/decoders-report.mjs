@@ -1,4 +1,4 @@
-// What decoders.mjs found, as Markdown.
+// The results of decoders.mjs, as Markdown.
 
 const median = (values) => {
   const sorted = [...values].sort((a, b) => a - b);
@@ -36,7 +36,7 @@ export function report(result) {
   return [...lines, '', ...milliseconds(jobs), '', ...verdict(result)].join('\n');
 }
 
-// What decodes beside the page's thread.
+// Decoders beside the page's thread.
 const NOTES = { two: '2 of ours', worker: '1 of Spark’s', browser: 'the browser’s own' };
 const COLUMNS = { one: 'one', ...NOTES };
 
@@ -72,7 +72,7 @@ function milliseconds(jobs) {
   return ['| file | decoder | threads | median, ms | fastest, ms |', '|---|---|---|---|---|', ...measured.map(row)];
 }
 
-// What ours may have of the bytes of SPZ.
+// Largest share of the bytes of SPZ that ours may have.
 const SHARE = 0.5;
 
 // Ours by itself beside each decoder of SPZ on one thread, and the bytes.

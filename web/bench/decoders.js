@@ -10,7 +10,7 @@ const REST = 45;
 
 const files = {};
 
-// What of a package is made once, before anything is timed.
+// Makes the parts of a package that are made once, before anything is timed.
 const once = (make) => {
   let made;
   return () => (made ??= make());

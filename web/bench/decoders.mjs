@@ -10,8 +10,8 @@
 // viewer itself draws from, as the table says. Bytes on the GPU are those of the scene, without what a viewer sorts and draws
 // with.
 //
-// LEXISPLAT_NPM needs playwright-core, three, fflate, playcanvas, @sparkjsdev/spark, @adobe/spz and @spz-loader/core. What is
-// not there is not measured, and the table says so.
+// LEXISPLAT_NPM needs playwright-core, three, fflate, playcanvas, @sparkjsdev/spark, @adobe/spz and @spz-loader/core.
+// A package that is not there is not measured, and the table says so.
 
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { cpus, tmpdir } from 'node:os';

@@ -1,4 +1,4 @@
-// What the benches and tests call in a page: the viewer without its controls.
+// The viewer as benches and tests call it in a page, without its controls.
 
 import * as wasm from '../wasm/viewer.js';
 import { show } from '../src/session.js';

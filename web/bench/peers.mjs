@@ -1,4 +1,4 @@
-// What decoders.mjs needs of other packages: Spark with a call to its decoder alone, and versions.
+// Parts of other packages for decoders.mjs: Spark with a call to its decoder alone, and versions.
 
 import { existsSync, readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';

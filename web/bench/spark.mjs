@@ -1,4 +1,4 @@
-// What dense SH and codes cost in Spark: bytes on the GPU, and the pass that makes the Gaussians of a view.
+// Cost of dense SH and of codes in Spark: bytes on the GPU, and the pass that makes the Gaussians of a view.
 //
 // LEXISPLAT_NPM=node_modules node bench/spark.mjs SCENE.lexi
 

@@ -59,9 +59,9 @@ export function codeWords({ count, codes }, dictionary, kept, order = Uint32Arra
 
   const words = new Uint32Array(count);
   let to = 0;
-  order.forEach((i, place) => {
+  order.forEach((i, index) => {
     const exact = escaped.get(i);
-    words[place] = ((exact ? ESCAPE : counts[i]) * 2 ** OFFSET_BITS + to) >>> 0;
+    words[index] = ((exact ? ESCAPE : counts[i]) * 2 ** OFFSET_BITS + to) >>> 0;
     if (exact) to = writeRow(exact, kept, nonzeros, to);
     else {
       for (let n = begins[i]; n < begins[i] + counts[i]; n++) {

@@ -3,7 +3,7 @@
 import * as wasm from '../wasm/decoder.js';
 import { handlerOf } from './handler.js';
 
-/** What was compiled, by its address. */
+/** Compiled modules, by address. */
 const compiled = new Map();
 
 /**

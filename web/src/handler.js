@@ -1,4 +1,4 @@
-/** What a worker does with a message, or the calling thread where there are no workers. */
+/** Handles a message in a worker, or in the calling thread where there are no workers. */
 
 import { rowsOf } from './rows.js';
 

@@ -25,7 +25,7 @@ export interface Progress {
   stalled?: number;
 }
 
-/** What a file says of itself. */
+/** The header of a file. */
 export interface Header {
   /** Version of the format. */
   version: number;
@@ -70,7 +70,7 @@ export interface Chunk {
   layer: number;
   /** Whether it is as fine as it will be. */
   complete: boolean;
-  /** Place of its first Gaussian in the scene. */
+  /** Index of its first Gaussian in the scene. */
   first: number;
   count: number;
   /** Three numbers a Gaussian. */

@@ -26,7 +26,7 @@ export class LexiParser {
   open(url: string, resource: LexiResource): LexiResource;
 }
 
-/** What an entity's gsplat component draws: geometry, codes and dictionary in textures, SH up to degree 3. */
+/** The resource that an entity's gsplat component draws: geometry, codes and dictionary in textures, SH up to degree 3. */
 export class LexiResource extends GSplatResourceBase {
   /** `chunk` is a whole scene, as 'codes'. */
   constructor(

@@ -1,8 +1,8 @@
 /** Workers that answer messages, each one at a time. */
 
-/** What was told when the WebAssembly of a worker failed, which happens when memory runs out. */
+/** The error when the WebAssembly of a worker failed, which happens when memory runs out. */
 const FAULT = 'the decoder failed, perhaps for lack of memory';
-/** What is told of a worker that never began. Browsers give no reason. */
+/** The error of a worker that never began. Browsers give no reason. */
 const NO_SCRIPT = "its script could not be loaded: is it where the package's other files are, and does the page allow it (worker-src)?";
 
 export class Pool {
@@ -49,7 +49,7 @@ export class Pool {
         try {
           onPart?.(part);
         } catch (refusal) {
-          // What a worker goes on to send is not taken.
+          // Later messages of the worker are not taken.
           waiting.delete(id);
           reject?.(refusal);
         }

@@ -75,7 +75,7 @@ export async function* streamed({ source, feed, pool, options, as, refine }) {
   let isRead = false;
 
   const report = () => onProgress?.({ loaded, total, decoded, gaussians: header.gaussians });
-  // Reads one piece. What the feed has no room for is read when chunks were decoded.
+  // Reads one piece. Bytes for which the feed has no room are read when chunks were decoded.
   const read = async () => {
     const end = (await feedOnce(feed, source, signal)) ?? (feed.ask_again() ? await feedOnce(feed, source, signal) : undefined);
     if (end === undefined) {

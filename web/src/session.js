@@ -11,7 +11,7 @@ import { sourceOf, watched } from './source.js';
 import { Stream } from './stream.js';
 import { viewerHandlerOf } from './viewer-handler.js';
 
-/** Bytes of a Gaussian on the GPU, besides its nonzeros: position and size, shape, base colour, and its place among codes. */
+/** Bytes of a Gaussian on the GPU, besides its nonzeros: position and size, shape, base colour, and its index among codes. */
 const GEOMETRY = 16 + 32 + 12 + 2;
 /** Bytes of a nonzero, and how many a Gaussian has at most on average in files that were met. */
 const NONZERO = 3;

@@ -1,7 +1,7 @@
 /**
  * Where the bytes of a file come from: an address, a Blob or bytes in memory.
  *
- * A source gives pieces of the file from any place on. An address is fetched once from its start, and by ranges where bytes
+ * A source gives pieces of the file from any offset on. An address is fetched once from its start, and by ranges where bytes
  * are to be skipped and the server has ranges. A source also gives ranges, several at the same time.
  */
 
@@ -59,7 +59,7 @@ export function after(bytes, source) {
 
 /**
  * Gives `feed` the bytes that it wants next, as far as they come at once.
- * @returns {Promise<number | undefined>} the place in the file after them; undefined if it wants none
+ * @returns {Promise<number | undefined>} the offset in the file after them; undefined if it wants none
  */
 export async function feedOnce(feed, source, signal) {
   const wanted = feed.wants();
@@ -128,7 +128,7 @@ class Address {
   #address;
   #controller;
   #reader;
-  /** The place in the file of the next byte of the running request, and the piece that came before it. */
+  /** The offset in the file of the next byte of the running request, and the piece that came before it. */
   #at = 0;
   #piece = new Uint8Array(0);
   #ranges = false;
@@ -141,7 +141,7 @@ class Address {
 
   async read(at, signal) {
     const before = this.#at - this.#piece.length;
-    // What was not taken of the last piece is given again.
+    // The part of the last piece that was not taken is given again.
     if (this.#reader && at >= before && at < this.#at) return this.#piece.subarray(at - before);
     const skipped = at - this.#at;
     if (!this.#reader || skipped < 0 || (skipped > WORTH_SKIPPING && this.#ranges)) await this.#request(at, signal);
@@ -151,7 +151,7 @@ class Address {
       const start = this.#at;
       this.#at += piece.length;
       this.#piece = piece;
-      // What was asked for may begin within the piece, or after it.
+      // The wanted bytes may begin within the piece, or after it.
       if (this.#at > at) return at > start ? piece.subarray(at - start) : piece;
     }
   }

@@ -1,4 +1,4 @@
-/** What a worker of the viewer does with a message: what the decoder's does, and parts of scenes as the GPU holds them. */
+/** Handles a message in a worker of the viewer: decoding, as the decoder's worker, and parts of scenes as the GPU holds them. */
 
 import { handlerOf } from './handler.js';
 

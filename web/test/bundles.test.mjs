@@ -34,7 +34,7 @@ globalThis.result = (async () => {
   });
   // Drawing takes longest.
   if (!location.pathname.includes('inline')) viewer.src = '/golden/${SCENE}';
-  else await customElements.get('lexi-viewer').place.compile();
+  else await customElements.get('lexi-viewer').program.compile();
   return { layered: await count('/golden/${SCENE}'), whole: await count('/golden/${WHOLE}'), drawn: viewer.src && (await loaded) };
 })();
 globalThis.result.catch(() => {});
@@ -50,7 +50,7 @@ async function load(name) {
   return module.default?.build || typeof module.default === 'function' ? module.default : module;
 }
 
-/** What builds `app/main.js` into `app/<name>/` and gives the script of the page there. */
+/** Functions that build `app/main.js` into `app/<name>/` and return the script of the page there. */
 const BUNDLERS = {
   async vite(app, options = {}) {
     const { build } = await load('vite');

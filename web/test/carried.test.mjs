@@ -40,7 +40,7 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
     await rm(folder, { recursive: true });
   });
 
-  /** What the page at `path` shows at rest, without its panel. */
+  /** Returns the picture of the page at `path` at rest, without its panel. */
   async function shown(path) {
     const page = await newPage(browser, { viewport: { width: 320, height: 200 } });
     page.setDefaultTimeout(PATIENCE);
@@ -65,12 +65,12 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
     const carried = join(folder, 'carried.html');
     execFileSync(program, ['html', golden, '-o', carried, '--tools', '--quiet']);
     const scene = (await readFile(golden)).toString('base64');
-    const place = 'id="scene" data-name=""></script>';
+    const marker = 'id="scene" data-name=""></script>';
     const page = await readFile(built, 'utf8');
-    assert.equal(page.split(place).length, 2);
+    assert.equal(page.split(marker).length, 2);
     const fresh = join(folder, 'fresh.html');
     const [words] = /data-words="[^"]*"/.exec(await readFile(carried, 'utf8'));
-    const filled = page.replace(place, () => `id="scene" data-name="${SCENE}">${scene}</script>`).replace('data-words=""', () => words);
+    const filled = page.replace(marker, () => `id="scene" data-name="${SCENE}">${scene}</script>`).replace('data-words=""', () => words);
     await writeFile(fresh, filled);
     const [a, b] = [await shown(carried), await shown(fresh)];
     assert.ok(psnr(a, b) >= SAME, `${psnr(a, b)} dB`);
@@ -103,7 +103,7 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
       };
       const view = await picture();
       const still = await picture(() => delete Navigator.prototype.gpu);
-      // What the still picture covers, of 16 by 9 whose shorter side is that of the window. Beside it there is nothing.
+      // The still picture covers 16 by 9 whose shorter side is that of the window. Beside it there is nothing.
       const short = Math.min(width, height);
       const edge = [(width - (short * 16) / 9) / 2, (height - short) / 2].map((side) => Math.max(0, Math.ceil(side)) + MOVED);
       const error = ([right, down]) => {

@@ -30,19 +30,19 @@ function plyOf(path) {
   const end = bytes.indexOf('end_header\n') + 'end_header\n'.length;
   const lines = bytes.toString('latin1', 0, end).split('\n');
   const count = Number(lines.find((line) => line.startsWith('element vertex ')).split(' ')[2]);
-  const places = new Map();
+  const offsets = new Map();
   let row = 0;
   for (const [, type, name] of lines.filter((line) => line.startsWith('property ')).map((line) => line.split(' '))) {
-    places.set(name, row);
+    offsets.set(name, row);
     row += SIZES[type];
   }
   const view = new DataView(bytes.buffer, bytes.byteOffset + end, bytes.length - end);
   assert.equal(view.byteLength, count * row);
-  const column = (name) => Float32Array.from({ length: count }, (_, i) => view.getFloat32(i * row + places.get(name), true));
-  return { count, names: [...places.keys()], column };
+  const column = (name) => Float32Array.from({ length: count }, (_, i) => view.getFloat32(i * row + offsets.get(name), true));
+  return { count, names: [...offsets.keys()], column };
 }
 
-/** The places of Gaussians in the order of their positions: a file may keep the order of its source, which `open` does not. */
+/** The indices of Gaussians in the order of their positions: a file may keep the order of its source, which `open` does not. */
 function sorted(count, coordinate) {
   const xyz = [0, 1, 2].map(coordinate);
   const compare = (a, b) => xyz.reduce((found, axis) => found || axis[a] - axis[b], 0);
@@ -195,11 +195,11 @@ test('files are fetched, with and without ranges', async () => {
 
 test('ranges are given at the same time, and a server without them is told', async () => {
   const ends = (_, response) => response.writeHead(206, { 'content-range': `bytes 0-9/${layered.length}` }).end(layered.subarray(0, 4));
-  const places = [[100, 300], [0, 1], [layered.length - 5, layered.length], [200, 40_000]];
+  const spans = [[100, 300], [0, 1], [layered.length - 5, layered.length], [200, 40_000]];
   const check = async (source) => {
     assert.ok(await source.hasRanges());
-    const ranges = await Promise.all(places.map(([from, to]) => source.range(from, to)));
-    ranges.forEach((bytes, k) => assert.deepEqual(Buffer.from(bytes), layered.subarray(...places[k])));
+    const ranges = await Promise.all(spans.map(([from, to]) => source.range(from, to)));
+    ranges.forEach((bytes, k) => assert.deepEqual(Buffer.from(bytes), layered.subarray(...spans[k])));
     await assert.rejects(source.range(layered.length - 1, layered.length + 1), /scene|f\.lexi/);
   };
   await check(sourceOf(layered));

@@ -34,7 +34,7 @@ for (const [backend, count] of [['webgl2', 2], ['webgpu', 1]]) {
   });
 }
 
-// What the shaders do, step by step in numbers.
+// The shaders' computation, step by step in numbers.
 function fromTexels({ textures: { lexiCode, lexiNonzeros, lexiAtoms } }, gaussian, coefficients) {
   const sum = new Float64Array(3 * coefficients);
   const count = lexiCode[gaussian] >>> 26;

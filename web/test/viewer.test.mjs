@@ -58,7 +58,7 @@ describe('the viewer with WebGPU', { skip: missing }, () => {
     }, files);
   const message = (text) => page.locator('.message', { hasText: text }).waitFor();
   const lit = ({ data }) => data.filter((value, at) => at % 4 === 1 && value > 24).length / (data.length / 4);
-  // What is shown when nothing changes any more.
+  // Returns the picture when nothing changes any more.
   const rested = async () => {
     for (let last; ; ) {
       await page.waitForTimeout(500);

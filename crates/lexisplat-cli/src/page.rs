@@ -128,10 +128,10 @@ mod tests {
         assert!(VIEWER.len() <= MOST, "{} bytes", VIEWER.len());
         let scenes = SCENES.map(|(id, rest)| format!("{id}{rest}"));
         let viewer = viewer().unwrap();
-        for place in
+        for marker in
             [TITLE, POSTER, WORDS, CONTROLS, FETCHES].into_iter().chain(scenes.iter().map(String::as_str))
         {
-            assert_eq!(viewer.matches(place).count(), 1, "{place}");
+            assert_eq!(viewer.matches(marker).count(), 1, "{marker}");
         }
     }
 

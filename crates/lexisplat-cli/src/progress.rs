@@ -114,10 +114,10 @@ fn filled(share: f64) -> String {
 
 /// Returns a bar with a block that moves to and fro.
 fn moving(elapsed: Duration) -> String {
-    let places = WIDTH - BLOCK;
-    let step = usize::try_from(elapsed.as_millis() / TICK.as_millis()).unwrap_or(0) % (2 * places);
-    let at = if step < places { step } else { 2 * places - step };
-    format!("{}{}{}", EMPTY.repeat(at), FULL.repeat(BLOCK), EMPTY.repeat(places - at))
+    let columns = WIDTH - BLOCK;
+    let step = usize::try_from(elapsed.as_millis() / TICK.as_millis()).unwrap_or(0) % (2 * columns);
+    let at = if step < columns { step } else { 2 * columns - step };
+    format!("{}{}{}", EMPTY.repeat(at), FULL.repeat(BLOCK), EMPTY.repeat(columns - at))
 }
 
 /// Returns a time in whole seconds, or in minutes and hours, as text.

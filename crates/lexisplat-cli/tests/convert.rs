@@ -119,7 +119,7 @@ fn scenes_are_cut_moved_and_merged() {
     assert!((turned[0] + 2.0 * x).abs() < 1e-5 && (turned[2] - 2.0 * z).abs() < 1e-5, "{turned:?}");
 }
 
-/// What single precision rounds the test scene by, relative to an offset; without one that is 0.25.
+/// Largest rounding of the test scene in single precision, relative to an offset; without one it is 0.25.
 const EXACT: f64 = 8e-6;
 /// The same with what packing rounds by.
 const PACKED: f64 = 0.2;

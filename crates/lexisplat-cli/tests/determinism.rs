@@ -21,7 +21,7 @@ const LARGE: usize = 270_000;
 /// Gaussians of the scene whose pictures are drawn again and again.
 const FEW: usize = 300;
 
-/// What is run, in this order, in a folder with `many.ply`, `large.ply`, `few.ply` and a few small cameras.
+/// The commands that run, in this order, in a folder with `many.ply`, `large.ply`, `few.ply` and a few small cameras.
 const COMMANDS: [&str; 13] = [
     "compress many.ply -o f16.lexi --tol 0.08 --sample 1000 --atoms 40 --save-dictionary dictionary.lexi",
     "compress many.ply -o f32.lexi --layout f32 --tol 0.1 --pursuit omp --dictionary dictionary.lexi",

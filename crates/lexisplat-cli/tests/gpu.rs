@@ -106,7 +106,7 @@ fn a_file_says_when_a_gpu_looked_at_the_scene() {
     assert_eq!(folder.json(&["info", "gpu.lexi"])["lexi"]["device"], name.as_str());
     assert!(folder.run(&["info", "gpu.lexi", "--all"]).contains(&name));
     assert!(told["target"]["mean_psnr"].as_f64().unwrap() >= 38.0);
-    // What the GPU sees is what the processor sees: the files are of a size.
+    // The GPU and the processor see the same, so the files are of a size.
     let reference = compress("cpu.lexi", "cpu");
     assert_eq!(folder.json(&["info", "cpu.lexi"])["lexi"]["device"], "cpu");
     let ratio = told["file_bytes"].as_f64().unwrap() / reference["file_bytes"].as_f64().unwrap();

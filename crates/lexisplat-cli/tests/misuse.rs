@@ -79,9 +79,9 @@ fn a_folder_in_place_of_a_scene_is_called_one() {
     let folder = Folder::new();
     let model = "out/point_cloud/iteration_30000/point_cloud.ply";
     for rounds in ["7000", "30000"] {
-        let place = folder.path(&format!("out/point_cloud/iteration_{rounds}"));
-        std::fs::create_dir_all(&place).unwrap();
-        std::fs::copy(folder.path("scene.ply"), place.join("point_cloud.ply")).unwrap();
+        let iteration = folder.path(&format!("out/point_cloud/iteration_{rounds}"));
+        std::fs::create_dir_all(&iteration).unwrap();
+        std::fs::copy(folder.path("scene.ply"), iteration.join("point_cloud.ply")).unwrap();
     }
     std::fs::create_dir(folder.path("empty")).unwrap();
     for (arguments, example) in [

@@ -265,7 +265,7 @@ fn a_limit_on_gaussians_is_kept() {
     let first = std::fs::read(folder.path("scene.lexi")).unwrap();
     folder.run(&[&limited[..], &["--overwrite"]].concat());
     assert!(std::fs::read(folder.path("scene.lexi")).unwrap() == first);
-    // What is reached is told beside the original, and no preset promises more than the limit lets it.
+    // The reached quality is beside the original, and no preset promises more than the limit lets it.
     assert!(number(&report["reached"]["mean_psnr"]) < 35.0);
     // A limit that is kept anyway changes nothing.
     let plain = [&BY_CAMERAS[..], &["--preset", "small", "-o", "plain.lexi"]].concat();

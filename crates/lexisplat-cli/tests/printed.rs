@@ -1,4 +1,4 @@
-//! What the program prints, whatever files hold and whatever goes wrong.
+//! The program's output, whatever files hold and whatever goes wrong.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Output, Stdio};
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 /// Clears a terminal, and rings its bell.
 const RUDE: &str = "\u{1b}[2J\u{7}";
-/// What [`RUDE`] is printed as.
+/// The printed form of [`RUDE`].
 const WRITTEN_OUT: &str = r"\u001b[2J\u0007";
 
 fn run(folder: &Folder, arguments: &[&str]) -> Output {

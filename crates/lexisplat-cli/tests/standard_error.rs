@@ -10,7 +10,7 @@ fn commands_without_a_window_are_silent_without_a_desktop() {
         &["devices"][..],
         &["devices", "--json"],
         &["render", "scene.ply", "-o", "pictures", "--orbit", "1", "--width", "32", "-q"],
-        // What takes over 10 s says so.
+        // A command that takes over 10 s says so.
         &["compress", "scene.ply", "--json", "-q"],
         &["compress", "scene.ply", "-o", "by-adapter.lexi", "--device", "auto", "-q"],
         &["compare", "scene.ply", "scene.lexi", "--orbit", "1", "--width", "32", "--json"],

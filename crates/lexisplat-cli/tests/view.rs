@@ -48,7 +48,7 @@ impl Drop for Display {
     }
 }
 
-/// What `lexisplat view` does on a display of its own; `None` where windows cannot be had.
+/// Runs `lexisplat view` on a display of its own. Returns its output; `None` where windows cannot be had.
 fn view(folder: &Folder, arguments: &[&str]) -> Option<Output> {
     view_with(folder, arguments, &[], Need::Display)
 }
@@ -189,7 +189,7 @@ fn a_window_opens_without_any_gpu() {
     assert!(output.status.success(), "{:?}: {error}", output.status);
     let found = psnr(&picture(&folder.path("shot.png")), &picture(&drawn), |_| true);
     assert!(found >= SAME, "{found:.1} dB");
-    // What only a GPU can do is refused.
+    // Without a GPU its actions are refused.
     let mut command = lexisplat();
     command.current_dir(folder.0.path()).envs(crate::gpu::NO_DRIVERS).env("DISPLAY", ":nowhere");
     let output = command.args(["view", "scene.ply", "--device", "gpu"]).output().unwrap();

@@ -89,9 +89,9 @@ pub(crate) fn find(
         let count = of_kind.len() as f64;
         let ranked = of_kind.into_iter().enumerate();
         // Views through clutter have the most detail, so views from likely places and other views are ranked apart.
-        seen.extend(ranked.map(|(place, (_, lit, camera))| Seen {
-            rank: (place as f64 + 0.5) / count,
-            may_judge: place.is_multiple_of(2),
+        seen.extend(ranked.map(|(index, (_, lit, camera))| Seen {
+            rank: (index as f64 + 0.5) / count,
+            may_judge: index.is_multiple_of(2),
             lit,
             camera,
         }));

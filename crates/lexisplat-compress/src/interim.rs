@@ -104,8 +104,8 @@ fn nearest<const N: usize>(
 /// covers.
 fn shrunk(image: &Image, camera: &Camera, smaller: &Camera) -> Image {
     let covered = |k: usize, of: u32, from: u32| {
-        let place = |k: usize| (k * from as usize).div_ceil(of.max(1) as usize);
-        place(k)..place(k + 1)
+        let begin = |k: usize| (k * from as usize).div_ceil(of.max(1) as usize);
+        begin(k)..begin(k + 1)
     };
     let [width, height] = smaller.picture_size();
     let mut pixels = Vec::with_capacity(width as usize * height as usize);

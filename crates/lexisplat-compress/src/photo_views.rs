@@ -156,7 +156,7 @@ mod tests {
             camera.validate().unwrap();
             let [x, y, z] = camera.to_view(forward);
             assert!(x.abs() < 1e-6 && y.abs() < 1e-6 && (z - 1.0).abs() < 1e-5);
-            // What is below lies lower in the picture, unless the camera looks up or down.
+            // A point below lies lower in the picture, unless the camera looks up or down.
             assert!(forward[1].abs() > 0.95 || camera.to_view([0.0, 1.0, 0.0])[1] > 0.0);
         }
     }

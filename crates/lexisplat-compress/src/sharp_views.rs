@@ -13,7 +13,7 @@ const SQUARE: u32 = 2;
 /// Side of a tile, in pixels.
 #[expect(clippy::cast_possible_truncation, reason = "16")]
 const TILE_PIXELS: u32 = TILE as u32;
-/// The golden ratio less 1: the step from the places of one view to those of the next.
+/// The golden ratio less 1: the step from the phases of one view to those of the next.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Returns the cameras, restricted to squares so that they draw about `pixels` pixels in all. If their whole pictures have
@@ -30,15 +30,15 @@ pub(crate) fn sampled(cameras: Vec<Camera>, pixels: u64) -> Vec<Camera> {
 /// Returns `camera`, the `k`-th, restricted to this share of its squares.
 fn squares_of(camera: Camera, share: f64, k: usize) -> Camera {
     let begin = (k as f64 * GOLDEN).fract();
-    let place = |x: u32, y: u32| (begin + f64::from(x) * PLASTIC[0] + f64::from(y) * PLASTIC[1]).fract();
+    let phase = |x: u32, y: u32| (begin + f64::from(x) * PLASTIC[0] + f64::from(y) * PLASTIC[1]).fract();
     let chosen =
-        |limit: f64| TileSet::new(camera.width, camera.height, |x, y| place(x / SQUARE, y / SQUARE) <= limit);
+        |limit: f64| TileSet::new(camera.width, camera.height, |x, y| phase(x / SQUARE, y / SQUARE) <= limit);
     let mut set = chosen(share);
     if set.tiles().is_empty() {
-        // A small picture has at least one square: that with the lowest place.
+        // A small picture has at least one square: that with the lowest phase.
         let squares = |side: u32| 0..side.div_ceil(SQUARE * TILE_PIXELS);
-        let places = squares(camera.width).flat_map(|x| squares(camera.height).map(move |y| place(x, y)));
-        set = chosen(places.fold(1.0, f64::min));
+        let phases = squares(camera.width).flat_map(|x| squares(camera.height).map(move |y| phase(x, y)));
+        set = chosen(phases.fold(1.0, f64::min));
     }
     camera.with_tiles(set)
 }

@@ -36,8 +36,8 @@ impl Sizes {
             })
             .collect();
         let mut at = |share: usize| {
-            let place = sizes.len() * share / 4;
-            (place < sizes.len()).then(|| *sizes.select_nth_unstable_by(place, f64::total_cmp).1)
+            let rank = sizes.len() * share / 4;
+            (rank < sizes.len()).then(|| *sizes.select_nth_unstable_by(rank, f64::total_cmp).1)
         };
         let [lower, median, upper] = [1, 2, 3].map(|share| at(share).unwrap_or(f64::NAN));
         let spread = upper - lower;

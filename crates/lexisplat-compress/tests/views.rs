@@ -52,7 +52,7 @@ fn views_from_beside_given_cameras_measure_and_do_not_judge() {
     let pairs: Vec<(f32, f32)> = measured.removal.into_iter().zip(alone.removal).collect();
     assert!(pairs.iter().all(|(all, given)| all >= given) && pairs.iter().any(|(all, given)| all > given));
     assert!(views.judging().iter().all(|judge| cameras.contains(judge)));
-    // What is fitted to is given or from all around.
+    // The fitted views are given or from all around.
     let fitted = views.fitting(&splats);
     let around = fitted.iter().filter(|camera| camera.name.starts_with("surround")).count();
     assert_eq!((fitted.len(), around), (6 + 8, 8));
@@ -76,12 +76,12 @@ fn a_scene_that_is_turned_scaled_and_moved_keeps_its_quality() {
     let splats = sample().with_degree_cut(ShDegree::ZERO);
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.9);
     let (scale, shift) = (3.0, DVec3::new(7.0, -20.0, 4.0));
-    let place = |p: DVec3| turn * p * scale + shift;
+    let moved = |p: DVec3| turn * p * scale + shift;
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
     let single = |v: f64| v as f32;
     let mut turned = splats.clone();
     for position in &mut turned.geometry.positions {
-        *position = place(DVec3::from_array(position.map(f64::from))).to_array().map(single);
+        *position = moved(DVec3::from_array(position.map(f64::from))).to_array().map(single);
     }
     for scales in &mut turned.geometry.scales {
         *scales = scales.map(|s| s + single(scale.ln()));
@@ -96,7 +96,7 @@ fn a_scene_that_is_turned_scaled_and_moved_keeps_its_quality() {
         .iter()
         .map(|camera| {
             let mut camera = camera.clone();
-            camera.position = place(DVec3::from_array(camera.position.map(f64::from))).to_array().map(single);
+            camera.position = moved(DVec3::from_array(camera.position.map(f64::from))).to_array().map(single);
             let columns =
                 [0, 1, 2].map(|k| turn * DVec3::from_array(camera.rotation.map(|row| f64::from(row[k]))));
             camera.rotation = std::array::from_fn(|row| columns.map(|column| single(column[row])));

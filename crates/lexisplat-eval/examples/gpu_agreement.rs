@@ -20,7 +20,7 @@ const MOST: usize = 13;
 const SPREAD: usize = 8;
 /// Widest picture in pixels.
 const WIDTH: u32 = 400;
-/// What a pixel may be off by, in units of a channel.
+/// Largest allowed difference of a pixel, in units of a channel.
 const LEVELS: f32 = 2.0 / 255.0;
 
 fn cameras(file: Option<&str>, scene: &Scene<'_>) -> Result<Vec<Camera>, Box<dyn Error>> {

@@ -24,9 +24,10 @@ fn repeated<T: Clone>(list: &[T], times: usize) -> Vec<T> {
 
 /// Width of nine tenths of the positions along `axis`.
 fn width(geometry: &Geometry, axis: usize) -> f32 {
-    let mut places: Vec<f32> = geometry.positions.iter().map(|p| p[axis]).collect();
-    places.sort_by(f32::total_cmp);
-    let at = |twentieths: usize| places.get(twentieths * places.len().saturating_sub(1) / 20).copied();
+    let mut coordinates: Vec<f32> = geometry.positions.iter().map(|p| p[axis]).collect();
+    coordinates.sort_by(f32::total_cmp);
+    let at =
+        |twentieths: usize| coordinates.get(twentieths * coordinates.len().saturating_sub(1) / 20).copied();
     at(19).zip(at(1)).map_or(0.0, |(high, low)| high - low)
 }
 

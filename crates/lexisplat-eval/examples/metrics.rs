@@ -24,7 +24,7 @@ fn read(path: &str) -> Result<Image, Box<dyn Error>> {
     Ok(Image::from_8bit(width, height, pixels)?)
 }
 
-/// What `metric` gives, or the least seconds it took.
+/// Returns the result of `metric`, or the least seconds it took.
 fn run(
     timed: bool,
     mut metric: impl FnMut() -> lexisplat_compress::Result<Option<f64>>,

@@ -51,8 +51,8 @@ impl Spread {
         values.sort_by(f64::total_cmp);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the length")]
         let at = |share: f64| {
-            let place = share * values.len().saturating_sub(1) as f64;
-            values.get(place.round() as usize).copied().unwrap_or(0.0)
+            let rank = share * values.len().saturating_sub(1) as f64;
+            values.get(rank.round() as usize).copied().unwrap_or(0.0)
         };
         Self { median: at(0.5), p10: at(0.1), p90: at(0.9) }
     }

@@ -19,7 +19,7 @@ const MOST_NAME: usize = 255;
 /// Reads a file by its plain name.
 type Read<'a> = dyn Fn(&str, &Limits) -> Result<Input> + Sync + 'a;
 
-/// The place of the files that a scene's file names.
+/// The files that a scene's file names.
 ///
 /// The file of a scene may come from anybody, and so may the names in it and the files around it. Names must be plain:
 /// without separators, drives and addresses, and neither `.` nor `..`. Names of a streamed SOG may have plain folders

@@ -1,5 +1,5 @@
 //! Small files that other programs made of the sample scene (data/README.md) hold it, within the quantum of their format.
-//! Those of `.ksplat` and glb are beside their readers.
+//! The tests of `.ksplat` and glb are beside their readers.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use lexisplat::ply::ReadOptions;

@@ -139,7 +139,7 @@ def test_rows_that_are_not_finite_are_refused() -> None:
         DictionaryLearner().fit(np.array([[1.0, np.nan]]))
 
 
-#: What scikit-learn checks and does not hold here, with the reason.
+#: Checks of scikit-learn that do not hold here, with the reason.
 EXPECTED_FAILURES: dict[str, str] = {}
 
 

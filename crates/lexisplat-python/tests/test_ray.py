@@ -26,7 +26,7 @@ from lexisplat.ray import _compress  # noqa: E402
 
 #: Gaussians of a tile. Four of them are more than a scene that is packed as a whole.
 TILE = 70_000
-#: What makes the tests fast.
+#: Options that make the tests fast.
 FAST: dict[str, Any] = {"guess": True, "keep_order": True}
 
 

@@ -41,8 +41,8 @@ pub(crate) fn size_at(geometry: &Geometry, share: usize) -> Option<f64> {
     if sizes.is_empty() {
         return None;
     }
-    let place = sizes.len() / share;
-    let size = f64::from(*sizes.select_nth_unstable_by(place, f32::total_cmp).1);
+    let rank = sizes.len() / share;
+    let size = f64::from(*sizes.select_nth_unstable_by(rank, f32::total_cmp).1);
     Some(libm::exp(size.clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE)))
 }
 

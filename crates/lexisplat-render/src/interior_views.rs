@@ -263,7 +263,7 @@ mod tests {
             let r = &camera.rotation;
             assert!(r[1][0].abs() < 1e-6 && r[1][1] > 0.9, "level, and not upside down");
             sum += DVec3::from_array(r.map(|row| f64::from(row[2])));
-            // What is before it is as far as a room's width allows.
+            // Walls before it are as far as a room's width allows.
             let near = g.positions.iter().filter(|p| {
                 let [x, y, z] = camera.to_view(**p);
                 z > camera.near && z < 0.7 && x.abs() < 0.3 * z && y.abs() < 0.3 * z

@@ -121,9 +121,9 @@ impl fmt::Display for Pose {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let distance = significant(self.distance);
         // The rounded distance determines the decimals, so that a pose that is read back is written in the same way.
-        let place = -(distance * POSITION_PART).log10().floor();
+        let digits = -(distance * POSITION_PART).log10().floor();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 30; NaN becomes 0")]
-        let decimals = place.clamp(0.0, MOST_DECIMALS) as usize;
+        let decimals = digits.clamp(0.0, MOST_DECIMALS) as usize;
         for value in self.position {
             write!(f, "{}:", rounded(value, decimals))?;
         }

@@ -25,7 +25,7 @@ pub enum Device {
     Cpu,
     /// The best GPU. Software such as lavapipe counts if there is nothing else.
     Gpu,
-    /// The GPU at this place in `gpu::adapters`.
+    /// The GPU at this index in `gpu::adapters`.
     Index(usize),
 }
 

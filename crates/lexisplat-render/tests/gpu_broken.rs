@@ -30,7 +30,7 @@ fn compare(gpu: &Gpu, renderer: &mut GpuRenderer, splats: &Splats, camera: &Came
     twins::check(&found, &render(&scene, camera, &options).unwrap(), case);
 }
 
-/// What puts one value into one property of a Gaussian.
+/// A function that puts one value into one property of a Gaussian.
 type Change = fn(&mut Splats, usize, usize, f32);
 
 #[test]

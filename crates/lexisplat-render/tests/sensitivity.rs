@@ -168,7 +168,7 @@ fn removal_is_what_the_pictures_lose() {
             squares = squares.max(sum / a.pixels.as_flattened().len() as f32);
         }
         assert!((s.removal_view[i] - squares).abs() < 1e-6 + 0.02 * squares, "Gaussian {i}: {squares}");
-        // What lies behind a finished pixel is not drawn, so it is not known to come back: at most the
+        // Splats behind a finished pixel are not drawn, so their return is not known: at most the
         // light a finished pixel has left, 1e-4 over 1 - 0.99.
         assert!((s.removal[i] - largest).abs() < 2e-2, "Gaussian {i}: {} {largest}", s.removal[i]);
         seen += usize::from(largest > 0.05);

@@ -43,9 +43,9 @@ fn sources_are_told_apart_by_content() {
     let nerf = read(root).unwrap().cameras;
     let splits: Vec<_> = nerf.iter().map(|c| (c.name.as_str(), c.split, c.width)).collect();
     assert_eq!(splits, [("./train/r_0", Some(Split::Train), 40), ("./test/r_0", Some(Split::Test), 40)]);
-    for (place, z) in [("colmap/sparse/0", "9"), ("sparse", "8"), ("sparse/0", "7"), (".", "6")] {
-        put(root, &format!("{place}/cameras.txt"), CAMERAS_TXT);
-        put(root, &format!("{place}/images.txt"), &IMAGES_TXT.replace("0 2 1", &format!("{z} 2 1")));
+    for (folder, z) in [("colmap/sparse/0", "9"), ("sparse", "8"), ("sparse/0", "7"), (".", "6")] {
+        put(root, &format!("{folder}/cameras.txt"), CAMERAS_TXT);
+        put(root, &format!("{folder}/images.txt"), &IMAGES_TXT.replace("0 2 1", &format!("{z} 2 1")));
         assert_eq!(read(root).unwrap().cameras[0].position[1].to_string(), format!("-{z}"));
     }
     assert_eq!(read(&root.join("sparse/images.txt")).unwrap().cameras[0].position[1].to_string(), "-8");

@@ -203,7 +203,7 @@ mod tests {
     }
 
     /// Columns are rounded, so their mean may be off by half a unit of the last digit, and the printed mean
-    /// is rounded itself. What is further off than that was not computed from its row.
+    /// is rounded itself. A mean that is further off was not computed from its row.
     #[test]
     fn printed_means_follow_from_their_columns_but_for_four() {
         let mut wrong = Vec::new();

@@ -104,7 +104,7 @@ pub(super) struct Evaluator<'a> {
 }
 
 impl Evaluator<'_> {
-    pub(super) fn scene(&mut self, entry: &Entry, place: usize) -> Part<(SceneResult, Vec<PictureFiles>)> {
+    pub(super) fn scene(&mut self, entry: &Entry, number: usize) -> Part<(SceneResult, Vec<PictureFiles>)> {
         if !entry.model.is_file() {
             let what = if entry.model.is_dir() { "is a folder, not a file" } else { "does not exist" };
             return Err(Failure::Scene(format!("{} {what}", entry.model.display())));
@@ -145,7 +145,7 @@ impl Evaluator<'_> {
         for &setting in settings(entry, self.options) {
             self.progress.part(&format!("{} {} {}", entry.name, entry.method, setting.label()));
             points.push(self.point(&mut subject, setting)?);
-            files.extend(subject.shown.iter().map(|&view| self.files(&subject, place, view, setting)));
+            files.extend(subject.shown.iter().map(|&view| self.files(&subject, number, view, setting)));
         }
         let shipped_bytes =
             entry.shipped.as_deref().and_then(|path| std::fs::metadata(path).ok()).map(|found| found.len());

@@ -170,8 +170,8 @@ mod tests {
     /// The cells of the paper's row below the only row that begins with `labels`.
     fn below(table: &Table, labels: &[&str]) -> String {
         let is_it = |row: &Row| row.cells.iter().zip(labels).all(|(a, b)| a == b);
-        let place = table.rows.iter().position(is_it).unwrap();
-        let row = table.rows.get(place + 1).filter(|row| row.is_paper);
+        let index = table.rows.iter().position(is_it).unwrap();
+        let row = table.rows.get(index + 1).filter(|row| row.is_paper);
         row.map_or(String::new(), |row| row.cells[labels.len()..].join(" ").replace('\u{2013}', "-"))
     }
 

@@ -216,11 +216,11 @@ impl App {
     /// Handles finished jobs, events of the render thread and errors of the driver.
     pub(crate) fn process_events(&mut self) {
         while let Ok(FinishedJob { id, slot, result }) = self.finished.try_recv() {
-            let place = &mut self.jobs[slot.index()];
-            if place.as_ref().is_none_or(|job| job.id != id) {
+            let running = &mut self.jobs[slot.index()];
+            if running.as_ref().is_none_or(|job| job.id != id) {
                 continue; // A later job has replaced this one.
             }
-            *place = None;
+            *running = None;
             match result {
                 Ok(model) => {
                     for warning in model.scene.warnings() {

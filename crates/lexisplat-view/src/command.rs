@@ -6,7 +6,7 @@ use lexisplat::ShDegree;
 use lexisplat::packed::Preset;
 use lexisplat_render::Pose;
 
-/// The place of one of the two models.
+/// The slot of one of the two models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Slot {
     /// The original, if two models are open.
@@ -110,7 +110,7 @@ impl std::fmt::Display for Quality {
 pub enum Command {
     /// Chooses the camera with this index, from 0.
     Camera(usize),
-    /// Moves by this number of places in the list of cameras. The first camera follows the last.
+    /// Moves by this number of cameras in their list. The first camera follows the last.
     StepCamera(isize),
     /// Moves the free camera to this pose.
     View(Pose),

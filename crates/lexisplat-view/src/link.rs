@@ -88,8 +88,8 @@ impl State {
 
 /// Returns whether one command would undo the other.
 fn concern_the_same(a: &Command, b: &Command) -> bool {
-    let places = |command: &Command| matches!(command, Command::View(_) | Command::Camera(_));
-    discriminant(a) == discriminant(b) || (places(a) && places(b))
+    let moves = |command: &Command| matches!(command, Command::View(_) | Command::Camera(_));
+    discriminant(a) == discriminant(b) || (moves(a) && moves(b))
 }
 
 #[cfg(test)]

@@ -46,7 +46,7 @@ pub struct State {
     free_camera: Option<CameraController>,
     arrangement: Arrangement,
     options: RenderOptions,
-    /// Which models are open.
+    /// Whether each model is open.
     open: [bool; 2],
     /// Whether the panel is shown.
     panel: bool,

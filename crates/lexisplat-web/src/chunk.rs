@@ -33,7 +33,7 @@ impl Chunk {
         self.model.len()
     }
 
-    /// Returns the place of the first Gaussian in the scene.
+    /// Returns the index of the first Gaussian in the scene.
     #[wasm_bindgen(getter)]
     #[must_use]
     pub fn first(&self) -> usize {

@@ -39,8 +39,8 @@ impl Decoder {
         let model = self.feed.decode(chunk);
         self.feed.forget(chunk);
         let model = model.map_err(thrown)?.ok_or_else(|| thrown("a job without the base of its chunk"))?;
-        let place = self.feed.outline().and_then(|outline| outline.chunks.get(chunk));
-        let first = place.map_or(0, |chunk| chunk.first);
+        let found = self.feed.outline().and_then(|outline| outline.chunks.get(chunk));
+        let first = found.map_or(0, |chunk| chunk.first);
         Ok(Chunk::new(model, first))
     }
 }

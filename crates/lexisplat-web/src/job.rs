@@ -1,7 +1,7 @@
 //! Jobs: the data that a worker needs to decode a chunk, as bytes that can be passed from thread to thread.
 //!
 //! All numbers are little-endian. A job has the number of the chunk (u32), the number of chunks whose base has come
-//! (u32), the numbers of these chunks (u32 each), the number of ranges (u32), the place in the file (u64) and length
+//! (u32), the numbers of these chunks (u32 each), the number of ranges (u32), the offset in the file (u64) and length
 //! (u32) of each range, and the bytes of the ranges.
 
 use lexisplat::lexi::LexiFeed;
@@ -58,9 +58,9 @@ impl<'j> Job<'j> {
         let bases = job.split_off(..count.checked_mul(4)?)?;
         let bases = bases.as_chunks().0.iter().map(|&b| u32::from_le_bytes(b) as usize).collect();
         let count = number(&mut job)?;
-        let places = job.split_off(..count.checked_mul(12)?)?;
-        let ranges = places.as_chunks::<12>().0.iter().map(|place| {
-            let (at, length) = (place.first_chunk()?, place.last_chunk()?);
+        let entries = job.split_off(..count.checked_mul(12)?)?;
+        let ranges = entries.as_chunks::<12>().0.iter().map(|entry| {
+            let (at, length) = (entry.first_chunk()?, entry.last_chunk()?);
             let bytes = job.split_off(..u32::from_le_bytes(*length) as usize)?;
             Some((u64::from_le_bytes(*at), bytes))
         });

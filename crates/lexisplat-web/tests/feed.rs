@@ -1,4 +1,4 @@
-//! What the feed of the main thread asks for, and what workers make of its jobs. Errors of JavaScript cannot be made outside of
+//! Requests of the main thread's feed, and results of its jobs in workers. Errors of JavaScript cannot be made outside of
 //! it, so what is refused is tested in `web/test`.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -22,16 +22,16 @@ fn file() -> Vec<u8> {
     file
 }
 
-fn place(at: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in a small file")]
-    let place = at as usize;
-    place
+fn offset(at: f64) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an offset in a small file")]
+    let offset = at as usize;
+    offset
 }
 
 /// Gives the feed what it wants, at most `piece` bytes at once. Returns whether it wanted anything.
 fn give(feed: &mut Feed, file: &[u8], piece: usize) -> bool {
     let Some(wanted) = feed.wants() else { return false };
-    let (from, to) = (place(wanted[0]), place(wanted[1]));
+    let (from, to) = (offset(wanted[0]), offset(wanted[1]));
     assert!(feed.feed(wanted[0], &file[from..to.min(from.saturating_add(piece))]).is_ok());
     true
 }

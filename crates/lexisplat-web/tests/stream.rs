@@ -27,7 +27,7 @@ fn file() -> Vec<u8> {
     file
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a place in a small file")]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an offset in a small file")]
 fn bytes(file: &[u8], from: f64, to: f64) -> &[u8] {
     &file[from as usize..to as usize]
 }

@@ -1,4 +1,4 @@
-//! What docs/FORMAT.md says of versions and of names that a reader does not know, of every layout and every
+//! The rules of docs/FORMAT.md for versions and for names that a reader does not know, of every layout and every
 //! reader.
 
 use std::path::PathBuf;
@@ -55,7 +55,7 @@ fn read(bytes: &[u8]) -> [Result<Splats>; 2] {
     [whole, in_parts()]
 }
 
-/// What each of the readers, that of dictionaries too where there is one, says against a file.
+/// Returns the error of each reader for a file, that of dictionaries too where there is one.
 fn refusals(bytes: &[u8], degree: &str) -> Vec<Error> {
     let mut errors: Vec<Error> = read(bytes).into_iter().map(|r| r.expect_err("taken")).collect();
     if degree != "0" {
@@ -219,8 +219,8 @@ fn tensors_that_may_be_ignored_are_but_their_checksum_is_not() {
         let at = bytes.windows(6).position(|w| w == [7; 6]).unwrap();
         bytes[at] ^= 1;
         for error in refusals(&bytes, parts.metadata["degree"].as_str().unwrap()) {
-            let problem = matches!(&error, Error::Format { problem: FormatError::Checksum { part }, .. }
-                if part == "x-thumbnail");
+            let problem = matches!(&error, Error::Format { problem: FormatError::Checksum { covered }, .. }
+                if covered == "x-thumbnail");
             assert!(problem, "{name}: {error}");
         }
     }
@@ -230,7 +230,7 @@ fn tensors_that_may_be_ignored_are_but_their_checksum_is_not() {
 fn any_other_unknown_tensor_is_refused_by_name() {
     for name in SCENES {
         let parts = parts_of(name);
-        // Those of other layouts are not known in this one.
+        // Names of other layouts are not known in this one.
         let mut unknown = vec!["X-thumbnail", "thumbnail", "codes.more", "sh.order", "packed.more", ""];
         if is_packed(name) {
             assert_refused(&parts.with("reached", r#"{"judged_psnr":38.5}"#), &["reached"]);
@@ -294,7 +294,7 @@ fn with_header(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
     let text = std::str::from_utf8(&bytes[8..8 + length]).unwrap();
     let entries: Value = serde_json::from_str(text).unwrap();
     let head = entries.get("packed.head");
-    let place = |i: usize| {
+    let offset = |i: usize| {
         let offsets = &head.unwrap_or(&entries["checksum.header"])["data_offsets"];
         usize::try_from(offsets[i].as_u64().unwrap()).unwrap()
     };
@@ -304,8 +304,8 @@ fn with_header(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
     header.extend_from_slice(changed.as_bytes());
     let data = &bytes[8 + length..];
     // The checksum of a packed file covers the rest of its tensor too.
-    let sum = crc32fast::hash(&[&header, &data[place(0) + 4..place(1)]].concat()).to_le_bytes();
-    let at = place(0) + header.len();
+    let sum = crc32fast::hash(&[&header, &data[offset(0) + 4..offset(1)]].concat()).to_le_bytes();
+    let at = offset(0) + header.len();
     let mut new = [&header, data].concat();
     new[at..at + 4].copy_from_slice(&sum);
     new
@@ -521,7 +521,7 @@ fn a_dictionary_alone_keeps_the_same_rules() {
     assert!(said.ends_with("is 3, and a dictionary's is 1"), "{said}");
     let said = read(&parts.with("degree", "0")).unwrap_err().to_string();
     assert!(said.contains("SH degree 0 has no dictionary"), "{said}");
-    // What only scenes have is not looked at.
+    // Parts that only scenes have are not looked at.
     let mut less = parts.with("layout", "holographic").with("pursuit", "lasso").with("seed", "x");
     less.metadata.remove("generator");
     assert_eq!(read(&less).unwrap(), original);

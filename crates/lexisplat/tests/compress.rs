@@ -323,7 +323,7 @@ fn sources_of_every_kind_give_the_same_bytes() {
     let ply = PlySource::open("t.ply", &ply, &ReadOptions::default(), &Silent).unwrap();
     let bytes = compressed(&splats);
     assert!(bytes == compressed(&ply));
-    // What a .lexi file gives is what it decodes to, whether exact or packed.
+    // A .lexi file gives the scene that it decodes to, whether exact or packed.
     let sensitivity = Sensitivity::guess(&splats.geometry);
     let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
     let mut packed = Vec::new();

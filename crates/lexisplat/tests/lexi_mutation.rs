@@ -9,7 +9,7 @@ use serde_json::Value;
 /// A reader may hold this many bytes per byte of input, plus [`ALLOWED_BASE`]: the tensors once, and the
 /// header as text, twice parsed.
 const ALLOWED_PER_BYTE: usize = 24;
-/// What error messages and empty maps may take.
+/// Bytes that error messages and empty maps may take.
 const ALLOWED_BASE: usize = 64 << 10;
 /// Structured mutations tried.
 const MUTATIONS: usize = 10_000;
@@ -24,7 +24,7 @@ fn accepted(bytes: &[u8]) -> bool {
     assert_eq!(in_parts.ok(), result.as_ref().ok().map(Model::len), "in parts and whole");
     match result {
         Ok(model) => {
-            // What is accepted is a model like any other.
+            // An accepted file is a model like any other.
             assert_eq!(model.dense_rest().len(), model.len() * model.degree().rest());
             true
         }

@@ -10,7 +10,7 @@ use lexisplat::{
 };
 use lexisplat_sample::{SampleOptions, scene};
 
-/// Gaussians that readers and coders take together in one place or another.
+/// Gaussians that readers and coders take together.
 const BORDERS: [usize; 4] = [1024, 2048, 32_768, 65_536];
 
 fn sample(count: usize, degree: u8) -> Splats {
@@ -82,7 +82,7 @@ fn plys() -> Vec<(&'static str, Vec<u8>)> {
         holes.geometry.scales[border - 1][0] = f32::NAN;
         holes.geometry.scales[border][1] = f32::INFINITY;
     }
-    // What is left of the first of these ends just at a border.
+    // The remaining rows of the first of these scenes end just at a border.
     (0..7).for_each(|i| holes.geometry.positions[i][2] = f32::NAN);
     let mut only_holes = sample(3000, 1);
     only_holes.geometry.dc.iter_mut().for_each(|dc| dc[0] = f32::NAN);

@@ -7,7 +7,7 @@ use lexisplat_testing::repository_file;
 
 /// Folders of the repository with Rust in them that is built.
 const FOLDERS: [&str; 2] = ["crates", "fuzz"];
-/// What stands before a block, an implementation, a function or a foreign one; `unsafe_code` is the lint.
+/// The marks before a block, an implementation, a function or a foreign one; `unsafe_code` is the lint.
 const MARKS: [&str; 6] =
     ["unsafe {", "unsafe impl", "unsafe fn", "unsafe extern", "#[unsafe(", "unsafe_code"];
 
@@ -19,7 +19,7 @@ fn each_source(folder: &Path, see: &mut dyn FnMut(&Path)) {
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            // What cargo builds and what fuzzing finds is no source.
+            // Outputs of cargo and of fuzzing are no source.
             if !path.ends_with("target") && !path.ends_with("corpus") {
                 each_source(&path, see);
             }

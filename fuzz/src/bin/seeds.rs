@@ -23,7 +23,7 @@ use lexisplat_formats::{Kind, WriteOptions};
 use lexisplat_fuzz::container::FEED_SCRIPT;
 use lexisplat_render::{Camera, orbit};
 use lexisplat_sample::{SampleOptions, scene};
-// What the build with coverage calls.
+// The build with coverage calls this crate.
 use libfuzzer_sys as _;
 
 type Done = Result<(), Box<dyn Error>>;
@@ -412,8 +412,8 @@ fn pieces(bytes: &[u8]) -> Result<Vec<u8>, Box<dyn Error>> {
         let name = usize::from(u16::from_le_bytes(rest[26..28].try_into()?));
         let (head, content) = rest[30..].split_at(name);
         let (content, after) = content.split_at(size);
-        let place = MEMBERS.iter().position(|member| member.as_bytes() == head).ok_or("an unknown member")?;
-        found[place] = content.to_vec();
+        let index = MEMBERS.iter().position(|member| member.as_bytes() == head).ok_or("an unknown member")?;
+        found[index] = content.to_vec();
         rest = after;
     }
     let mut all = vec![1];

@@ -22,7 +22,7 @@ const MOST_DEGREE = 3;
 // Bounds of a Gaussian in standard deviations, as PlayCanvas takes them.
 const BOUND = 2;
 
-/** What an entity's gsplat component draws. SH stay codes on the GPU. */
+/** The resource that an entity's gsplat component draws. SH stay codes on the GPU. */
 export class LexiResource extends GSplatResourceBase {
   /**
    * @param {import('playcanvas').GraphicsDevice} device
@@ -89,11 +89,11 @@ function orderOf({ count, positions }, reorder) {
   return new GSplatData([{ name: 'vertex', count, properties: ['x', 'y', 'z'].map(column) }]).calcMortonOrder();
 }
 
-// What GSplatResourceBase asks of a scene's data.
+// The methods of a scene's data that GSplatResourceBase calls.
 function dataOf({ count, positions, scales }, shBands, order) {
   const getCenters = () => {
     const centers = new Float32Array(3 * count);
-    order.forEach((i, place) => centers.set(positions.subarray(3 * i, 3 * i + 3), 3 * place));
+    order.forEach((i, index) => centers.set(positions.subarray(3 * i, 3 * i + 3), 3 * index));
     return centers;
   };
   const calcAabb = (box) => {
@@ -118,14 +118,14 @@ function dataOf({ count, positions, scales }, shBands, order) {
 // Positions are whole floats; turns, sizes and colours are half floats, as in the engine's own resource of a PLY.
 function geometryTexels({ count, positions, scales, rotations, opacities, dc }, order) {
   const placed = new Uint32Array(4 * count);
-  const places = new Float32Array(placed.buffer);
+  const positionsOut = new Float32Array(placed.buffer);
   const shape = new Uint16Array(4 * count);
   const color = new Uint16Array(4 * count);
-  order.forEach((i, place) => {
+  order.forEach((i, index) => {
     const [w, x, y, z] = unit(rotations, 4 * i);
-    const to = 4 * place;
+    const to = 4 * index;
     for (let k = 0; k < 3; k++) {
-      places[to + k] = positions[3 * i + k];
+      positionsOut[to + k] = positions[3 * i + k];
       shape[to + k] = half(Math.exp(scales[3 * i + k]));
       color[to + k] = half(0.5 + SH_C0 * dc[3 * i + k]);
     }

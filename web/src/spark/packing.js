@@ -30,7 +30,7 @@ function roomFor(count) {
 
 const byte = (value) => Math.max(0, Math.min(255, Math.round(255 * value)));
 
-/** The arrays of a PackedSplats, filled chunk by chunk. What is not there yet has opacity 0. */
+/** The arrays of a PackedSplats, filled chunk by chunk. Gaussians that are not there yet have opacity 0. */
 export class Packing {
   /**
    * @param {number} count Gaussians of the scene

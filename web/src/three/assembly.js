@@ -31,7 +31,7 @@ export class Assembly {
     this.covariances = new Float32Array(6 * count);
     this.colors = new Uint8ClampedArray(4 * count);
     this.bands = Array.from({ length: this.degree }, (_, band) => createPackedSphericalHarmonicsBand(count, band + 1));
-    /** What is there. */
+    /** The stages that are there. */
     this.stages = new Stages(count);
   }
 

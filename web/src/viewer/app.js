@@ -25,7 +25,7 @@ const PLACES = /^\s*(view|camera|orbit|frame)\b/;
 
 /**
  * @typedef {object} Options
- * @property {import('./engine.js').Place} place where the program's parts are
+ * @property {import('./engine.js').Program} program where the program's parts are
  * @property {'all' | 'bar' | 'none'} controls the whole panel, a small bar, or nothing
  * @property {boolean} [still] whether the scene does not turn by itself
  * @property {boolean} whole whether the viewer is all of its page, which then takes keys and the wheel from everywhere
@@ -37,7 +37,7 @@ const PLACES = /^\s*(view|camera|orbit|frame)\b/;
  */
 
 export class App {
-  /** What the viewer said after its last picture. */
+  /** The viewer's report of its last picture. */
   report;
   #stop = new AbortController();
   #begun;
@@ -133,7 +133,7 @@ export class App {
     this.#wanted.slots.add(slot);
     this.notice.busy();
     if (!(await this.start()) || this.#stop.signal.aborted) return false;
-    const { env } = await loadEngine(this.options.place);
+    const { env } = await loadEngine(this.options.program);
     return this.loads.open(source, slot, env);
   }
 
@@ -257,7 +257,7 @@ export class App {
     const missing = obstacle();
     if (missing) return this.#cannot(missing);
     try {
-      const { Viewer } = await loadEngine(this.options.place);
+      const { Viewer } = await loadEngine(this.options.program);
       if (signal.aborted) return false;
       await this.stage.start(Viewer, {});
       if (this.#wanted.words) await this.run(this.#wanted.words);

@@ -15,7 +15,7 @@ export function percent(share) {
   return `${Math.floor(100 * share)} %`;
 }
 
-/** What came of a load: bytes, and the share of them. */
+/** Returns the bytes of a load that came, and their share. */
 export function arrived(load) {
   if (!load.progress) return 'Waiting for the first bytes';
   const { loaded, total } = load.progress;
@@ -23,7 +23,7 @@ export function arrived(load) {
   return share === undefined ? bytes(loaded) : `${bytes(loaded)} of ${bytes(total)}, ${percent(share)}`;
 }
 
-/** What is to be said of a load that goes on but gets no bytes; empty for others. */
+/** Returns the message for a load that goes on but gets no bytes; empty for others. */
 export function stalled({ active, progress }) {
   return active && progress?.stalled ? `Nothing has come for ${count(progress.stalled / 1000)} s` : '';
 }

@@ -1,4 +1,4 @@
-// What the panel says of one scene.
+// The panel's text for one scene.
 
 import { arrived, setBar, stalled } from './arrival.js';
 import { bytes, count, icon, make, say, time } from './dom.js';

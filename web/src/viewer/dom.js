@@ -79,7 +79,7 @@ export function time(milliseconds) {
   return milliseconds < 1000 ? `${milliseconds.toFixed(1)} ms` : `${(milliseconds / 1000).toFixed(2)} s`;
 }
 
-/** What went wrong, as a sentence for people. Rust throws texts, JavaScript errors. */
+/** Returns the reason of an error, as a sentence for people. Rust throws texts, JavaScript errors. */
 export function reason(error) {
   const text = String(error?.message ?? error).trim() || 'it failed without a reason';
   return /[.!?]$/.test(text) ? text : `${text}.`;

@@ -1,5 +1,5 @@
 /** Where the parts of the viewer are. */
-export interface Place {
+export interface Program {
   /** Gives the compiled viewer. */
   compile: () => Promise<WebAssembly.Module>;
   /** Starts a worker that decodes. */
@@ -19,7 +19,7 @@ export interface ViewerModel {
   layout: string;
 }
 
-/** What is shown, and its figures. */
+/** The scenes that are shown, and their figures. */
 export interface ViewerReport {
   device: string;
   mode: ViewMode;
@@ -106,7 +106,7 @@ export interface LexiViewerEventMap extends HTMLElementEventMap {
  */
 export class LexiViewer extends HTMLElement {
   /** Where the program's parts are. Set it before the first element begins if they are not beside the module. */
-  static place: Place;
+  static program: Program;
   /** Addresses of the scenes. */
   src: string;
   src2: string;
@@ -129,15 +129,15 @@ export class LexiViewer extends HTMLElement {
   budget: string;
   /** Most bytes that are held of such a file. Default 128 MiB, on phones 32 MiB. */
   budgetBytes: string;
-  /** What the scene is, in words. */
+  /** A description of the scene in words. */
   alt: string;
-  /** What is shown and its figures; undefined before there is a picture. */
+  /** The scenes that are shown, and their figures; undefined before there is a picture. */
   readonly report: ViewerReport | undefined;
   /** Begins now. Resolves with whether this browser can draw. */
   start(): Promise<boolean>;
   /** Opens a scene in slot 0 or 1. Resolves with whether all of it came. */
   open(source: string | URL | Blob, slot?: 0 | 1): Promise<boolean>;
-  /** What `camera` would be for the view that is shown; undefined before there is one. */
+  /** Returns the value of `camera` for the view that is shown; undefined before there is one. */
   link(): Promise<string | undefined>;
   /** Carries out words of a script of `lexisplat view`. Rejects with the reason if one is wrong. */
   run(words: string): Promise<void>;

@@ -6,9 +6,9 @@ import { obstacle } from './engine.js';
 import { folder } from './folder.js';
 
 const ATTRIBUTES = ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still', 'budget', 'budget-bytes'];
-// Those that are there or not.
+// Attributes that are there or not.
 const FLAGS = ['still'];
-// Those after a change of which the element begins anew.
+// Attributes after a change of which the element begins anew.
 const SHAPES = ['controls', 'still'];
 // A number of a camera, not a place.
 const NUMBER = /^\s*\d+\s*$/;
@@ -27,7 +27,7 @@ const Base = globalThis.HTMLElement ?? class {};
  */
 export class LexiViewer extends Base {
   /** Where the program's parts are. Set it before the first element begins if they are not beside this file. */
-  static place = folder;
+  static program = folder;
   static observedAttributes = ATTRIBUTES;
 
   #app;
@@ -43,11 +43,11 @@ export class LexiViewer extends Base {
   connectedCallback() {
     const on = (name, detail) => this.#told(name, detail);
     this.#stop = new AbortController();
-    // What was begun before the element was moved, or changed its shape, goes on without being asked for again.
+    // A scene that was begun before the element was moved, or changed its shape, goes on without being asked for again.
     const goesOn = this.#begun;
     this.#begun = false;
     this.#app = new App(this.shadowRoot, {
-      place: LexiViewer.place,
+      program: LexiViewer.program,
       controls: this.#controls(),
       still: this.still,
       budget: this.#budget(),
@@ -117,12 +117,12 @@ export class LexiViewer extends Base {
     return this.#app?.run(words);
   }
 
-  /** What `camera` would be for the view that is shown. */
+  /** Returns the value of `camera` for the view that is shown. */
   async link() {
     return this.#app?.link();
   }
 
-  /** What is shown and its figures; undefined before there is a picture. */
+  /** The scenes that are shown, and their figures; undefined before there is a picture. */
   get report() {
     const report = this.#app?.report;
     return report && { ...report, streams: this.#app.loads.streams };

@@ -2,7 +2,7 @@
 
 /**
  * Where the program's parts are.
- * @typedef {object} Place
+ * @typedef {object} Program
  * @property {() => Promise<WebAssembly.Module>} compile gives the compiled viewer
  * @property {() => Worker} worker starts a worker that decodes
  * @property {number} workers how many of them; 0 decodes on the page's thread
@@ -18,19 +18,19 @@ export function obstacle() {
 
 /**
  * Loads the viewer. Later calls give what the first one loaded; a failure is forgotten, so that a later call tries again.
- * @param {Place} place
+ * @param {Program} program
  * @returns {Promise<{Viewer: any, env: {wasm: WebAssembly.Module, worker: () => Worker, workers: number}}>}
  */
-export function load(place) {
-  loading ??= start(place).catch((error) => {
+export function load(program) {
+  loading ??= start(program).catch((error) => {
     loading = undefined;
     throw error;
   });
   return loading;
 }
 
-async function start(place) {
-  const [glue, wasm] = await Promise.all([import('../../wasm/viewer.js'), place.compile()]);
+async function start(program) {
+  const [glue, wasm] = await Promise.all([import('../../wasm/viewer.js'), program.compile()]);
   await glue.default({ module_or_path: wasm });
-  return { Viewer: glue.Viewer, env: { wasm, worker: place.worker, workers: place.workers } };
+  return { Viewer: glue.Viewer, env: { wasm, worker: program.worker, workers: program.workers } };
 }

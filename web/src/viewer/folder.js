@@ -3,7 +3,7 @@
 // Workers that decode a scene. More leave no processor to the page on phones.
 const WORKERS = 2;
 
-/** @type {import('./engine.js').Place} */
+/** @type {import('./engine.js').Program} */
 export const folder = {
   compile: async () => {
     const answer = await fetch(new URL('../../wasm/viewer_bg.wasm', import.meta.url));

@@ -6,7 +6,7 @@ import { reason } from './dom.js';
 // Most bytes that a scene and its drawing may take on the GPU. Phones end pages that take more.
 const MEMORY = 2 ** 30;
 
-/** What is known of a scene that is being loaded, or was.
+/** The state of a scene that is being loaded, or was.
  * @typedef {object} Load
  * @property {string} name
  * @property {boolean} file whether it is a file, not an address
@@ -40,7 +40,7 @@ export class Loads {
   }
 
   /**
-   * Loads a scene. What the slot shows stays until the first bytes of the new scene are understood. Never rejects.
+   * Loads a scene. The scene of the slot stays until the first bytes of the new scene are understood. Never rejects.
    * @param {string | URL | Blob} source
    * @param {0 | 1} slot
    * @param {any} env of `engine.load`
@@ -143,7 +143,7 @@ export class Loads {
     return this.slots.map((load) => load?.stream?.state);
   }
 
-  /** Stops the load of a slot. What was shown of it stays. */
+  /** Stops the load of a slot. Its shown part stays. */
   cancel(slot) {
     this.#stops[slot]?.abort();
     this.#stops[slot] = undefined;

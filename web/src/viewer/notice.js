@@ -1,4 +1,4 @@
-// What is in the place of a picture that is not there: how to open a scene, why there is none, a still picture.
+// The notice in place of a picture that is not there: how to open a scene, why there is none, a still picture.
 
 import { arrived, setBar, stalled } from './arrival.js';
 import { make, say } from './dom.js';

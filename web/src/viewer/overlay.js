@@ -1,4 +1,4 @@
-// What lies over the picture: names of the scenes, PSNR, the wipe's line, and messages.
+// The overlay of the picture: names of the scenes, PSNR, the wipe's line, and messages.
 
 import { make, reason, say } from './dom.js';
 import { wipeLine } from './wipe.js';
@@ -9,7 +9,7 @@ const MOST = 3;
 /** Makes the names and the line over the picture. @param {(split: number) => void} split */
 export function makeOverlay(split) {
   const line = wipeLine(split);
-  const [left, right, score] = ['left', 'right', 'score'].map((place) => make('span', { class: `label ${place}`, hidden: true }));
+  const [left, right, score] = ['left', 'right', 'score'].map((name) => make('span', { class: `label ${name}`, hidden: true }));
   const middle = make('span', { class: 'middle', hidden: true });
   const element = make('div', { class: 'overlay' }, middle, left, right, score, line.element);
   const label = (where, text) => {
@@ -47,7 +47,7 @@ export function makeMessages() {
    * @param {{wrong?: boolean, text?: string}} [options] text: something to copy
    */
   function add(what, { wrong = false, text } = {}) {
-    // What fails again with each picture is said once.
+    // An error that comes again with each picture is said once.
     const last = element.lastElementChild;
     if (last?.firstElementChild.textContent === reason(what) && !text) return last;
     const close = make('button', { type: 'button', class: 'small', onclick: () => message.remove() }, 'Close');

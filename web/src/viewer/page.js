@@ -8,10 +8,10 @@ const PLAIN_TITLE = 'lexisplat';
 
 /**
  * Fills the page with a viewer.
- * @param {import('./engine.js').Place} place where the program's parts are
+ * @param {import('./engine.js').Program} program where the program's parts are
  * @param {(string | Blob | undefined)[]} [scenes] those that the page carries
  */
-export function startPage(place, scenes = []) {
+export function startPage(program, scenes = []) {
   const { poster, words, controls, still } = document.body.dataset;
   // A page that carries its scene loads nothing.
   const carries = scenes.some(Boolean);
@@ -19,7 +19,7 @@ export function startPage(place, scenes = []) {
   const root = document.getElementById('viewer').attachShadow({ mode: 'open' });
   const address = new URLSearchParams(carries ? '' : location.search);
   const budget = { splats: address.get('budget'), bytes: address.get('budget-bytes') };
-  const app = new App(root, { place, controls, still: still !== undefined, budget, whole: true, poster, link, on: told });
+  const app = new App(root, { program, controls, still: still !== undefined, budget, whole: true, poster, link, on: told });
   if (controls === 'all') {
     listenToDrops(window, {
       signal: new AbortController().signal,

@@ -24,7 +24,7 @@ async function compile() {
 const code = new Blob([document.getElementById('worker').textContent], { type: 'text/javascript' });
 const address = URL.createObjectURL(code);
 // Chromium starts no module worker from a blob of a page from disk.
-const place = { compile, worker: () => new Worker(address), workers: WORKERS };
+const program = { compile, worker: () => new Worker(address), workers: WORKERS };
 
 const scenes = ['scene', 'scene2'].map((id) => {
   const element = document.getElementById(id);
@@ -40,4 +40,4 @@ const scenes = ['scene', 'scene2'].map((id) => {
     element.textContent = '';
   }
 });
-startPage(place, scenes);
+startPage(program, scenes);

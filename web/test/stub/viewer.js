@@ -1,5 +1,5 @@
 // Stands in for the viewer's WebAssembly in tests of the page: it answers the same calls and paints with a 2D canvas, so
-// that those tests are quick, need no build, and see each call. What it paints depends on the camera and the scenes.
+// that those tests are quick, need no build, and see each call. Its picture depends on the camera and the scenes.
 
 const MODES = ['first', 'second', 'side', 'wipe', 'difference'];
 const DEVICE = 'stub';

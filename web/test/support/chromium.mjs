@@ -1,4 +1,4 @@
-// What tests in a real browser share: headless Chromium with WebGPU and WebGL2 in software, a file server on localhost
+// Parts that tests in a real browser share: headless Chromium with WebGPU and WebGL2 in software, a file server on localhost
 // with ranges and a held rate, and pictures of what a page shows.
 //
 // Packages come from the folder of node_modules that LEXISPLAT_NPM names. CHROMIUM names another browser.

@@ -1,4 +1,4 @@
-// What tests of the viewer's page and element share: a browser, and the sources served with the stand-ins of test/stub.
+// Parts that tests of the viewer's page and element share: a browser, and the sources served with the stand-ins of test/stub.
 
 import assert from 'node:assert/strict';
 import { mkdtemp, rm, writeFile } from 'node:fs/promises';
@@ -95,7 +95,7 @@ export function calls(page, name) {
   return page.evaluate((name) => globalThis.viewers.at(-1).calls.filter((call) => call[0] === name), name);
 }
 
-/** What the newest stand-in reports as soon as it does not draw. */
+/** Returns the report of the newest stand-in, as soon as it does not draw. */
 export function reportOf(page) {
   return page.evaluate(async () => {
     const viewer = globalThis.viewers.at(-1);

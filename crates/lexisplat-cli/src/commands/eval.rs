@@ -76,7 +76,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         None => Some(load(&args.models[0], common)?),
     };
     let Some(reference) = original.as_ref().or(first.as_ref()) else { return Ok(()) };
-    let (offset, place) = (reference.scene().meta().offset, Whereabouts::of(&reference.scene()));
+    let (offset, whereabouts) = (reference.scene().meta().offset, Whereabouts::of(&reference.scene()));
     let options = ViewOptions { offset, ..args.views.options(Some(&args.photos)) };
     let found = find_views(&options, reference.scene().geometry())?;
     warn("views", &found.warnings);
@@ -98,7 +98,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
             Some(model) => model,
             None => load(path, common)?,
         };
-        model.align(&place);
+        model.align(&whereabouts);
         warn_of(&model);
         let drawn = draw_views(&mut renderer, &model.scene(), &cameras, &drawing, &bars)?;
         let against = |references: &[Image]| {

@@ -90,8 +90,8 @@ fn run_within(args: &Render, splats: u64, common: &Common) -> Result<()> {
     let fill = |scene: &mut StreamedScene, eye: &Eye| -> Result<u64> {
         let mut read = 0;
         while let Some(range) = scene.wants(eye, &budget) {
-            let place = usize::try_from(range.start)?..usize::try_from(range.end)?;
-            let found = bytes.get(place.clone()).or(bytes.get(place.start..)).unwrap_or_default();
+            let span = usize::try_from(range.start)?..usize::try_from(range.end)?;
+            let found = bytes.get(span.clone()).or(bytes.get(span.start..)).unwrap_or_default();
             if found.is_empty() {
                 let problem = FormatError::Truncated {
                     what: "the file".to_owned(),

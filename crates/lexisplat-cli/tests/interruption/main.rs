@@ -3,6 +3,6 @@
 
 mod disks;
 mod kills;
-mod places;
+mod outputs;
 mod runs;
 mod signals;

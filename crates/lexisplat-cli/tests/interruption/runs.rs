@@ -9,9 +9,9 @@ use lexisplat_sample::{SampleOptions, scene};
 
 use crate::folder::Folder;
 
-/// What the scene is coded or decoded to.
+/// The output of coding or decoding the scene.
 pub(crate) const OUTPUT: &str = "made";
-/// What was there before.
+/// The content of the output before a run.
 pub(crate) const OLD: &[u8] = b"what was there before";
 /// A program that does not come so far hangs.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(120);
@@ -79,7 +79,7 @@ pub(crate) fn ready() -> Folder {
     folder
 }
 
-/// What a job makes if nobody disturbs it, and how long that takes.
+/// Returns the output of a job that nobody disturbs, and its time.
 pub(crate) fn undisturbed(folder: &Folder, job: &[&str]) -> (Vec<u8>, Duration) {
     let clock = Instant::now();
     folder.run(job);
@@ -90,7 +90,7 @@ pub(crate) fn undisturbed(folder: &Folder, job: &[&str]) -> (Vec<u8>, Duration) 
     (bytes, seconds)
 }
 
-/// What a program printed to standard error, without the lines that it prints every ten seconds where a machine is slow.
+/// Returns the standard error of a program, without the lines that it prints every ten seconds where a machine is slow.
 pub(crate) fn said(error: Vec<u8>) -> String {
     let text = String::from_utf8(error).unwrap();
     let is_progress = |line: &str| line.starts_with("progress: ") && line.ends_with(" s since the start\n");
@@ -115,7 +115,7 @@ pub(crate) fn wait_until_watching(child: &Child, signal: i32) {
     }
 }
 
-/// What a shell calls the end of a program.
+/// Returns the exit code by which a shell calls the end of a program.
 pub(crate) fn code(status: ExitStatus) -> i32 {
     status.code().or_else(|| status.signal().map(|signal| 128 + signal)).unwrap()
 }

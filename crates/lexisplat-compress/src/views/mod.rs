@@ -116,7 +116,7 @@ pub struct ChosenViews {
     pub views: Vec<View>,
     /// Where the views come from: the file or folder as given, `orbit` or `room`.
     pub from: String,
-    /// What was left out or looks wrong, one sentence each.
+    /// Warnings of views that were left out or look wrong, one sentence each.
     pub warnings: Vec<String>,
 }
 

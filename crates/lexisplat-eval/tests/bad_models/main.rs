@@ -12,7 +12,7 @@ use lexisplat::{
 use lexisplat_render::{Camera, RenderOptions, Scene, interior_views, object, orbit, render, surround};
 use support::{cameras, copies, everything, sample, through_ply};
 
-/// What puts a value into one property of a Gaussian.
+/// A function that puts a value into one property of a Gaussian.
 type Change = fn(&mut Splats, usize, f32);
 
 /// By the name of the property in a PLY and of the array in the library.

@@ -41,7 +41,7 @@ pub(crate) fn cameras() -> Vec<Camera> {
     orbit(&sample(100, 0).geometry, 2, 72, 48)
 }
 
-/// What `splats` become on their way through a PLY.
+/// Writes `splats` to a PLY and reads it.
 pub(crate) fn through_ply(splats: &Splats, drop_invalid: bool) -> lexisplat::Result<ply::PlyRead> {
     let mut bytes = Vec::new();
     ply::write(&mut bytes, splats).unwrap();
@@ -60,7 +60,7 @@ fn renderers() -> Vec<Renderer> {
     std::iter::once(Renderer::cpu()).chain(gpu.iter().map(|gpu| Renderer::on(gpu).unwrap())).collect()
 }
 
-/// What came of a scene.
+/// The results of a scene.
 pub(crate) struct Outcome {
     pub(crate) lint: Lint,
     /// Gaussians whose SH are stored exactly, in layout f16.

@@ -56,20 +56,20 @@ pub(super) fn to_three(values: [f32; 3], [low, high]: &Bounds) -> u32 {
     a << 21 | b << 11 | c
 }
 
-/// Returns the rotation (w, x, y, z) of a code. The code has 2 bits for the place of the largest component in this order,
+/// Returns the rotation (w, x, y, z) of a code. The code has 2 bits for the index of the largest component in this order,
 /// and 10 bits for each of the others.
 #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
 pub(super) fn rotation(code: u32) -> [f32; 4] {
-    let place = (code >> 30) as usize;
+    let largest = (code >> 30) as usize;
     let mut components = [0.0_f64; 4];
     let (mut left, mut squares) = (code, 0.0);
-    for k in (0..4).rev().filter(|k| *k != place) {
+    for k in (0..4).rev().filter(|k| *k != largest) {
         let share = f64::from(left & ((1 << TURN_BITS) - 1)) / most(TURN_BITS);
         components[k] = (share - TURN_HALF) * std::f64::consts::SQRT_2;
         squares += components[k] * components[k];
         left >>= TURN_BITS;
     }
-    components[place] = (1.0 - squares).max(0.0).sqrt();
+    components[largest] = (1.0 - squares).max(0.0).sqrt();
     components.map(|v| v as f32)
 }
 
@@ -82,17 +82,17 @@ fn once(turn: [f32; 4]) -> u32 {
     let wide = turn.map(f64::from);
     let length = wide.iter().map(|v| v * v).sum::<f64>().sqrt();
     let mut components = if length > 0.0 { wide.map(|v| v / length) } else { [1.0, 0.0, 0.0, 0.0] };
-    let mut place = 0;
+    let mut largest = 0;
     for k in 1..4 {
-        if components[k].abs() > components[place].abs() {
-            place = k;
+        if components[k].abs() > components[largest].abs() {
+            largest = k;
         }
     }
-    if components[place] < 0.0 {
+    if components[largest] < 0.0 {
         components = components.map(|v| -v);
     }
-    let mut code = u32::try_from(place).unwrap_or(0);
-    for k in (0..4).filter(|k| *k != place) {
+    let mut code = u32::try_from(largest).unwrap_or(0);
+    for k in (0..4).filter(|k| *k != largest) {
         let share = components[k] * std::f64::consts::FRAC_1_SQRT_2 + TURN_HALF;
         code = code << TURN_BITS | to_bits(share, TURN_BITS);
     }

@@ -126,7 +126,7 @@ impl Accessor {
         Ok(Self { span, stride, component, count })
     }
 
-    /// Calls `put` for each element of `range`, with its place in `range` and its `N` numbers.
+    /// Calls `put` for each element of `range`, with its index in `range` and its `N` numbers.
     pub(super) fn read<const N: usize>(
         &self,
         buffers: &Buffers<'_>,
@@ -167,10 +167,10 @@ impl Elements<'_> {
         mut put: impl FnMut(usize, [f32; N]),
         number: impl Fn([u8; B]) -> f32,
     ) {
-        for (place, element) in self.range.enumerate() {
+        for (index, element) in self.range.enumerate() {
             let bytes = self.bytes.get(element.saturating_mul(self.stride)..).unwrap_or_default();
             if let Some((numbers, _)) = bytes.as_chunks::<B>().0.split_first_chunk::<N>() {
-                put(place, numbers.map(&number));
+                put(index, numbers.map(&number));
             }
         }
     }

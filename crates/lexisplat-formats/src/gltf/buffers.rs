@@ -48,7 +48,7 @@ impl<'a> Buffers<'a> {
             match bytes.get_mut(index) {
                 None => return Err(missing(name, "buffer", index)),
                 Some(Some(_)) => {}
-                Some(place) => *place = Some(load(name, document, bin, index)?),
+                Some(slot) => *slot = Some(load(name, document, bin, index)?),
             }
         }
         Ok(Self { bytes })

@@ -6,7 +6,7 @@ use lexisplat::Offset;
 use serde::Serialize;
 
 use super::document::Shape;
-use super::place::GLTF;
+use super::placement::GLTF;
 
 /// `componentType` of floats of 32 bits.
 const FLOAT: u32 = 5126;

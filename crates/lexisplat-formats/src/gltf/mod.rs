@@ -12,7 +12,7 @@ mod document;
 mod glb;
 mod json;
 mod nodes;
-mod place;
+mod placement;
 mod primitive;
 mod scene;
 #[cfg(test)]

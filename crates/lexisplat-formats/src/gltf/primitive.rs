@@ -9,7 +9,7 @@ use lexisplat::{Error, Result, ShDegree};
 use super::buffers::missing;
 use super::document::{Document, Primitive, Splatting};
 use super::nodes::Shown;
-use super::place::{GLTF, Place};
+use super::placement::{GLTF, Placement};
 use super::{MOST_SHOWN, attribute, of_degree, rest_attributes, warn};
 
 /// Value of `mode` for points.
@@ -25,7 +25,7 @@ const EXTENSION_DEGREE: u8 = 3;
 /// The axes in the bytes of an SPZ relative to those of a trainer's PLY. Half a turn about x leads to them.
 const SPZ: [bool; 3] = [false, true, true];
 
-/// The place of the values of splats.
+/// The source of the values of splats.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Source {
     /// Indices of the accessors of position, rotation, scale, opacity and SH coefficient 0, and those of SH-rest in the
@@ -41,7 +41,7 @@ pub(super) struct Found {
     /// Name of the primitive in messages.
     pub(super) label: String,
     pub(super) source: Source,
-    pub(super) place: Place,
+    pub(super) placement: Placement,
 }
 
 impl Found {
@@ -83,9 +83,9 @@ pub(super) fn find(
         };
         others += sources.others;
         for (label, source, changes) in &sources.splats {
-            let place = Place::of(name, node.node, &node.matrix, *changes)?;
-            mirrored += usize::from(place.is_mirrored);
-            found.push(Found { label: label.clone(), source: source.clone(), place });
+            let placement = Placement::of(name, node.node, &node.matrix, *changes)?;
+            mirrored += usize::from(placement.is_mirrored);
+            found.push(Found { label: label.clone(), source: source.clone(), placement });
             if found.len() > MOST_SHOWN {
                 let (what, limit) = (format!("splat primitives in {name}"), MOST_SHOWN as u64);
                 return Err(Error::Limit { what, found: limit + 1, limit, name: None });
@@ -111,7 +111,7 @@ pub(super) fn find(
 
 /// The primitives of a mesh.
 struct Sources {
-    /// For each splat primitive: its name in messages, the place of its values, and the axes whose signs differ from
+    /// For each splat primitive: its name in messages, the source of its values, and the axes whose signs differ from
     /// those of the glTF.
     splats: Vec<(String, Source, [bool; 3])>,
     /// Number of primitives that are not splats.
@@ -132,7 +132,7 @@ fn sources(name: &str, document: &Document<'_>, index: usize, warnings: &mut Vec
     Ok(sources)
 }
 
-/// Returns the place of the values of `primitive`, and the axes whose signs differ from those of the glTF. Returns `None`
+/// Returns the source of the values of `primitive`, and the axes whose signs differ from those of the glTF. Returns `None`
 /// if the primitive is not of splats.
 fn source(
     name: &str,

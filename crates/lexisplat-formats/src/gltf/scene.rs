@@ -11,7 +11,7 @@ use lexisplat::{Error, Offset, Result, Rounding, ShDegree};
 use super::buffers::Buffers;
 use super::columns::Accessors;
 use super::document::Document;
-use super::place::Place;
+use super::placement::Placement;
 use super::primitive::{Found, Source};
 use super::warn;
 use crate::rows::{Rows, RowsMut};
@@ -36,12 +36,12 @@ enum Splats {
     Packed(Packed),
 }
 
-/// The splats of a primitive with their place.
+/// The splats of a primitive with their placement.
 struct PlacedSplats {
     /// Numbers of the Gaussians.
     gaussians: Range<usize>,
     splats: Splats,
-    place: Place,
+    placement: Placement,
 }
 
 /// The splats of all primitives.
@@ -81,7 +81,7 @@ impl<'a> Scene<'a> {
     /// Subtracts the translation of the first primitive from all primitives and returns it, if single precision is too
     /// coarse at this distance from the origin for the sizes of the first Gaussians.
     pub(super) fn settle_offset(&mut self) -> Option<Offset> {
-        let translation = self.primitives.first()?.place.translation();
+        let translation = self.primitives.first()?.placement.translation();
         let offset = Offset::new(translation).ok()??;
         let most = translation.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         let n = self.len().min(SAMPLE);
@@ -102,7 +102,7 @@ impl<'a> Scene<'a> {
         if !rounding.is_coarse() {
             return None;
         }
-        self.primitives.iter_mut().for_each(|one| one.place.rebase(offset));
+        self.primitives.iter_mut().for_each(|one| one.placement.rebase(offset));
         Some(offset)
     }
 
@@ -158,7 +158,11 @@ impl<'a> Scene<'a> {
             let start = self.len();
             options.limits.check_gaussians(name, (start as u64).saturating_add(len as u64))?;
             self.degree = self.degree.max(degree);
-            self.primitives.push(PlacedSplats { gaussians: start..start + len, splats, place: found.place });
+            self.primitives.push(PlacedSplats {
+                gaussians: start..start + len,
+                splats,
+                placement: found.placement,
+            });
         }
         Ok(())
     }
@@ -195,7 +199,7 @@ impl Rows for Scene<'_> {
                 Splats::Plain(accessors) => accessors.fill(&self.buffers, local, degree, out.reborrow()),
                 Splats::Packed(packed) => packed.fill(local, degree, out.reborrow()),
             }
-            one.place.apply(degree, out);
+            one.placement.apply(degree, out);
         }
     }
 

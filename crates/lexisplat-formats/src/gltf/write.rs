@@ -9,7 +9,7 @@ use super::columns::{log_scale, logit};
 use super::document::Shape;
 use super::glb::{BIN, CHUNK_HEADER, HEADER, JSON, MAGIC, VERSION};
 use super::json::{Attribute, Root};
-use super::place::GLTF;
+use super::placement::GLTF;
 use super::{attribute, rest_attributes};
 use crate::axes::Flip;
 use crate::lost::Lost;

@@ -1,4 +1,4 @@
-//! Little-endian values at places that are within the bytes.
+//! Little-endian values at offsets that are within the bytes.
 
 pub(super) fn u16_at(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([bytes[at], bytes[at + 1]])

@@ -45,7 +45,7 @@ struct Member {
     checksum: u32,
     packed: u32,
     plain: u32,
-    /// Place of the member's header.
+    /// Offset of the member's header.
     at: u32,
 }
 
@@ -142,7 +142,7 @@ impl<'a> Archive<'a> {
             return Err(malformed(&format!("has not the {plain} bytes that the directory says")));
         }
         if crc32fast::hash(&content) != member.checksum {
-            return Err(Error::format(self.name, FormatError::Checksum { part: called.to_owned() }));
+            return Err(Error::format(self.name, FormatError::Checksum { covered: called.to_owned() }));
         }
         Ok(Content::Member(content, packed.len() as u64))
     }
@@ -246,7 +246,7 @@ pub(super) fn write(members: &[(&str, Vec<u8>)]) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Returns a size or a place in 32 bits.
+/// Returns a size or an offset in 32 bits.
 fn short(size: usize) -> Result<u32> {
     let limit = u64::from(u32::MAX);
     u32::try_from(size).map_err(|_| {

@@ -133,8 +133,8 @@ fn bins(sorted: &[f32]) -> Vec<[f64; 2]> {
     for (i, value) in sorted.iter().map(|v| f64::from(*v)).enumerate() {
         let by_rank = i as f64 / sorted.len() as f64;
         let by_value = (value - low) / (high - low);
-        let place = BY_VALUE * by_value + (1.0 - BY_VALUE) * by_rank;
-        let sum = &mut sums[((place * bins as f64) as usize).min(bins - 1)];
+        let share = BY_VALUE * by_value + (1.0 - BY_VALUE) * by_rank;
+        let sum = &mut sums[((share * bins as f64) as usize).min(bins - 1)];
         sum[0] += value;
         sum[1] += 1.0;
     }

@@ -77,17 +77,17 @@ fn distinct(rows: Rows<'_>, most: usize) -> Option<Palette> {
 /// Sorts entries into the order in which rows first use them, and removes unused entries.
 fn by_appearance(entries: &[f32], mut labels: Vec<u32>, width: usize) -> Palette {
     let entries = Rows { values: entries, width };
-    let mut places = vec![u32::MAX; entries.len()];
+    let mut new_labels = vec![u32::MAX; entries.len()];
     let mut ordered = Vec::with_capacity(entries.values.len());
     let mut count = 0;
     for label in &mut labels {
-        let place = &mut places[*label as usize];
-        if *place == u32::MAX {
-            *place = count;
+        let entry = &mut new_labels[*label as usize];
+        if *entry == u32::MAX {
+            *entry = count;
             count += 1;
             ordered.extend_from_slice(entries.get(*label as usize));
         }
-        *label = *place;
+        *label = *entry;
     }
     Palette { entries: ordered, labels }
 }
@@ -117,7 +117,7 @@ impl Groups {
         let mut numbers: Vec<u32> = (0_u32..).take(entries.len()).collect();
         numbers.sort_by_key(|&i| nearest[i as usize]);
         let values = numbers.iter().flat_map(|&i| entries.get(i as usize)).copied().collect();
-        let group_of = |place: &u32| nearest[*place as usize] as usize;
+        let group_of = |entry: &u32| nearest[*entry as usize] as usize;
         let starts = (0..=of_means.len()).map(|g| numbers.partition_point(|i| group_of(i) < g)).collect();
         Ok(Self { means, entries: values, numbers, starts })
     }

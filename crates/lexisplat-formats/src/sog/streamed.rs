@@ -162,7 +162,7 @@ struct Found {
     warnings: Vec<String>,
 }
 
-/// Returns the finest level with Gaussians, and the references to these Gaussians, sorted by file and place.
+/// Returns the finest level with Gaussians, and the references to these Gaussians, sorted by file and index.
 fn finest(tree: &Node) -> (u32, Vec<Reference>) {
     let (mut level, mut references) = (u32::MAX, Vec::new());
     let mut left = vec![tree];

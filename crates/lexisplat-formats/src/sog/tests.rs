@@ -93,7 +93,7 @@ fn pictures_that_are_links_and_pipes_are_refused() {
     assert_eq!(opened_at(&scene).unwrap().len(), GAUSSIANS);
 }
 
-/// What is said of a SOG that `change` made wrong.
+/// Returns the error of a SOG that `change` made wrong.
 fn refused(change: impl Fn(&mut Members)) -> Error {
     let mut members = members(&sample());
     change(&mut members);
@@ -253,7 +253,7 @@ fn archives_that_unpack_to_more_than_they_say_are_refused() {
         let error = opened(&deflated(META, &content, plain)).unwrap_err();
         assert!(error.to_string().contains("bytes that the directory says"), "{error}");
     }
-    // What is deflated is read.
+    // Deflated members are read.
     let members = members(&sample());
     let meta = &members[META];
     let bytes = deflated(META, meta, u32::try_from(meta.len()).unwrap());

@@ -14,7 +14,7 @@ const POWER_STEPS: usize = 3;
 /// A group of similar rows.
 #[derive(Debug)]
 struct Group {
-    /// Place of the group's rows in the order.
+    /// Indices of the group's rows in the order.
     range: Range<usize>,
     mean: Vec<f64>,
     /// Sum of the squared distances to the mean.

@@ -38,7 +38,7 @@ pub(super) struct Header {
     pub(super) fraction: u8,
     pub(super) antialiased: bool,
     pub(super) has_extensions: bool,
-    /// Number of streams that are not empty, and the place of their table; only in version 4.
+    /// Number of streams that are not empty, and the offset of their table; only in version 4.
     pub(super) table: Option<(usize, usize)>,
 }
 
@@ -57,8 +57,8 @@ impl Header {
             return Err(Error::format(name, problem));
         }
         if !versions.contains(&version) {
-            let place = if gzipped { "inside gzip" } else { "outside of gzip" };
-            return Err(malformed(format!("SPZ version {version} {place}")));
+            let wrapping = if gzipped { "inside gzip" } else { "outside of gzip" };
+            return Err(malformed(format!("SPZ version {version} {wrapping}")));
         }
         let [degree, fraction, flags, streams] = [bytes[12], bytes[13], bytes[14], bytes[15]];
         let degree =

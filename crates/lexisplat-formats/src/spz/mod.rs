@@ -40,7 +40,7 @@ const SCALE_LEAST: f32 = -10.0;
 const SH_ZERO: f32 = 128.0;
 /// Number of bytes of an entry of the table of streams: the lengths before and after inflating.
 const ENTRY: usize = 16;
-/// Place of the version in a header.
+/// Offset of the version in a header.
 const VERSION_AT: usize = 4;
 /// First bytes of gzip.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
@@ -244,7 +244,7 @@ mod tests {
         WriteOptions { spz_version: version, ..WriteOptions::default() }
     }
 
-    /// What is said of scenes at the origin, far away, and of those with an offset.
+    /// Warnings of scenes at the origin, far away, and with an offset.
     #[test]
     fn steps_that_are_coarse_far_away_are_told() {
         let near = scene(&SampleOptions::new(60, 1));

@@ -21,19 +21,19 @@ fn unit([w, x, y, z]: [f32; 4]) -> [f32; 4] {
     if length > 0.0 { wide.map(|v| (v / length) as f32) } else { [0.0, 0.0, 0.0, 1.0] }
 }
 
-/// Returns the rotation (w, x, y, z) of 32 bits: 2 bits for the place of the largest component among (x, y, z, w), then
+/// Returns the rotation (w, x, y, z) of 32 bits: 2 bits for the index of the largest component among (x, y, z, w), then
 /// sign and magnitude of the others (`packQuaternionSmallestThree`).
 pub(super) fn smallest_three(code: u32) -> [f32; 4] {
-    let place = (code >> (3 * (BITS + 1))) as usize;
+    let largest = (code >> (3 * (BITS + 1))) as usize;
     let mut components = [0.0; 4];
     let (mut left, mut squares) = (code, 0.0);
-    for k in (0..4).rev().filter(|k| *k != place) {
+    for k in (0..4).rev().filter(|k| *k != largest) {
         let size = LARGEST * (left & MASK) as f32 / MASK as f32;
         components[k] = if left >> BITS & 1 == 1 { -size } else { size };
         squares += size * size;
         left >>= BITS + 1;
     }
-    components[place] = (1.0_f32 - squares).max(0.0).sqrt();
+    components[largest] = (1.0_f32 - squares).max(0.0).sqrt();
     let [x, y, z, w] = components;
     [w, x, y, z]
 }
@@ -46,15 +46,15 @@ pub(super) fn to_smallest_three(rotation: [f32; 4]) -> u32 {
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a magnitude of 9 bits")]
 fn once(rotation: [f32; 4]) -> u32 {
     let components = unit(rotation);
-    let mut place = 0;
+    let mut largest = 0;
     for k in 1..4 {
-        if components[k].abs() > components[place].abs() {
-            place = k;
+        if components[k].abs() > components[largest].abs() {
+            largest = k;
         }
     }
-    let negate = components[place] < 0.0;
-    let mut code = place as u32;
-    for k in (0..4).filter(|k| *k != place) {
+    let negate = components[largest] < 0.0;
+    let mut code = largest as u32;
+    for k in (0..4).filter(|k| *k != largest) {
         let size = (components[k].abs() / LARGEST * MASK as f32).round().min(MASK as f32) as u32;
         // A component of 0 has no negative sign.
         let negative = size > 0 && (components[k] < 0.0) != negate;

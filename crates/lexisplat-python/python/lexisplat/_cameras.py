@@ -158,17 +158,17 @@ def as_tuples(cameras: Iterable[Camera]) -> list[_native.CameraTuple]:
     if not isinstance(cameras, Iterable) or isinstance(cameras, (bytes, dict)):
         raise wrong_type("cameras", cameras, expected)
     tuples = []
-    for place, c in enumerate(cameras):
+    for index, c in enumerate(cameras):
         if not isinstance(c, Camera):
-            raise wrong_type(f"cameras[{place}]", c, "a Camera")
+            raise wrong_type(f"cameras[{index}]", c, "a Camera")
         c._checked()
-        place_of = c.position.tolist(), c.rotation.tolist()
-        tuples.append((c.name, c.width, c.height, c.fx, c.fy, *place_of, c.near, c.split))
+        pose = c.position.tolist(), c.rotation.tolist()
+        tuples.append((c.name, c.width, c.height, c.fx, c.fy, *pose, c.near, c.split))
     return tuples
 
 
 def _of_tuple(camera: _native.CameraTuple) -> Camera:
     name, width, height, fx, fy, position, rotation, near, split = camera
-    place = np.array(position, np.float64), np.array(rotation, np.float32)
-    return Camera(width, height, fx, fy, *place, name, split, near)
+    pose = np.array(position, np.float64), np.array(rotation, np.float32)
+    return Camera(width, height, fx, fy, *pose, name, split, near)
 

@@ -33,7 +33,7 @@ def _seed(name: str, value: object) -> int:
     return count(name, value, MOST_SEED)
 
 
-#: What each option of :func:`compress` that the native part has may be, but for cameras.
+#: The check of each option of :func:`compress` that the native part has, but for cameras.
 _OPTIONS: dict[str, Callable[[str, Any], object]] = {
     **dict.fromkeys(["preset", "pursuit", "views", "view", "layout"], text),
     **dict.fromkeys(["psnr", "min_psnr", "ratio", "tol"], number),
@@ -43,7 +43,7 @@ _OPTIONS: dict[str, Callable[[str, Any], object]] = {
     "max_nonzeros": lambda name, value: count(name, value, BYTE),
     "seed": _seed,
 }
-#: Those that may not be ``None``.
+#: The options that may not be ``None``.
 _NEEDED = ("seed", "keep_order", "keep_all", "lod", "guess", "memory")
 
 

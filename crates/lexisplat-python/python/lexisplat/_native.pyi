@@ -143,7 +143,7 @@ def encode_rows(
     npt.NDArray[np.int64], npt.NDArray[np.int32], _Rows64, npt.NDArray[np.float64], npt.NDArray[np.int64]
 ]: ...
 
-# The steps of packing in tiles. What passes between them are bytes.
+# The steps of packing in tiles. Bytes pass between them.
 TILE_BLOCK: int
 TILE_BUCKET: int
 

@@ -50,7 +50,7 @@ class LexiCompression:
             The folder.
         splats : mapping of tensors or arrays
             ``means``, ``scales`` (logarithms), ``quats``, ``opacities`` (logits), ``sh0``, ``shN``. Other keys are
-            refused, because a .lexi has no place for them.
+            refused, because a .lexi cannot hold them.
         """
         if isinstance(compress_dir, Mapping):
             raise wrong_type("compress_dir", compress_dir, "a path: compress(compress_dir, splats) takes the folder first")

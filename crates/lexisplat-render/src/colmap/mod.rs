@@ -29,9 +29,9 @@ use pose::Posed;
 
 /// Largest file read, in bytes. `images.bin` holds every keypoint: 24 bytes each, and about 10,000 for each photo.
 pub const MAX_COLMAP_BYTES: u64 = 4 << 30;
-/// Places of a model in the given folder: the folder itself, COLMAP's own layout, the layout of INRIA's `convert.py`, and
+/// Folders of a model in the given folder: the folder itself, COLMAP's own layout, the layout of INRIA's `convert.py`, and
 /// nerfstudio's layout.
-const PLACES: [&str; 4] = ["", "sparse/0/", "sparse/", "colmap/sparse/0/"];
+const FOLDERS: [&str; 4] = ["", "sparse/0/", "sparse/", "colmap/sparse/0/"];
 
 /// The names of the two files of a model.
 pub(crate) struct ModelFiles {
@@ -40,12 +40,12 @@ pub(crate) struct ModelFiles {
     images: String,
 }
 
-/// Finds the model among `files`: the model in the first of the [`PLACES`] that has one. A place with both kinds gives
+/// Finds the model among `files`: the model in the first of the [`FOLDERS`] that has one. A folder with both kinds gives
 /// the binary model.
 pub(crate) fn find<F: ViewFiles + ?Sized>(files: &F) -> Option<ModelFiles> {
-    PLACES.iter().find_map(|place| {
+    FOLDERS.iter().find_map(|folder| {
         [(true, "bin"), (false, "txt")].into_iter().find_map(|(binary, end)| {
-            let [cameras, images] = ["cameras", "images"].map(|name| format!("{place}{name}.{end}"));
+            let [cameras, images] = ["cameras", "images"].map(|name| format!("{folder}{name}.{end}"));
             (files.has(&cameras) && files.has(&images)).then_some(ModelFiles { binary, cameras, images })
         })
     })

@@ -272,7 +272,7 @@ fn carried<const N: usize>(
     )
 }
 
-/// Places of sums in the result of [`carried_with_squares`].
+/// Indices of sums in the result of [`carried_with_squares`].
 const ROW_SUM: usize = 5;
 const OPACITY_SQUARES: usize = 6;
 const SIZE_SQUARES: usize = 7;

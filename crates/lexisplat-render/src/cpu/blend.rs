@@ -114,8 +114,8 @@ pub(super) struct Canvas {
 struct Queue {
     splats: [Splat; FETCHED],
     len: usize,
-    /// For each entry: the place of the splat in the batch, and the column and row of the block.
-    places: [[u8; 3]; QUEUED],
+    /// For each entry: the index of the splat in the batch, and the column and row of the block.
+    blocks: [[u8; 3]; QUEUED],
     /// For each entry: first the exponents of the opacities of the pixels, then the opacities.
     lanes: [Lanes; QUEUED],
 }
@@ -130,7 +130,7 @@ impl Default for Canvas {
         let queue = Queue {
             splats: [Splat::default(); FETCHED],
             len: 0,
-            places: [[0; 3]; QUEUED],
+            blocks: [[0; 3]; QUEUED],
             lanes: [[0.0; LANES]; QUEUED],
         };
         Self { blocks: [[Block::EMPTY; BLOCKS]; BLOCKS], open: [[true; BLOCKS]; BLOCKS], queue }
@@ -140,7 +140,7 @@ impl Default for Canvas {
 impl Queue {
     /// Replaces the entries by entries of the splats in `slots`, for the open blocks of `tile` that the splats may touch.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "a place in a batch or a tile")]
+    #[expect(clippy::cast_possible_truncation, reason = "an index in a batch or a tile")]
     fn fill(
         &mut self,
         splats: &[Splat],
@@ -160,7 +160,7 @@ impl Queue {
                 for row in first[1]..end[1] {
                     if open[column][row] {
                         let at = self.len % QUEUED;
-                        self.places[at] = [k as u8, column as u8, row as u8];
+                        self.blocks[at] = [k as u8, column as u8, row as u8];
                         let any = across.powers(&mut self.lanes[at], splat, &y[row]);
                         self.len += usize::from(any);
                     }
@@ -171,8 +171,8 @@ impl Queue {
 
     /// Returns the splat of an entry, and the column and row of its block.
     #[inline(always)]
-    fn place(&self, at: usize) -> (&Splat, usize, usize) {
-        let [k, column, row] = self.places[at % QUEUED].map(usize::from);
+    fn block(&self, at: usize) -> (&Splat, usize, usize) {
+        let [k, column, row] = self.blocks[at % QUEUED].map(usize::from);
         (&self.splats[k % FETCHED], column % BLOCKS, row % BLOCKS)
     }
 }
@@ -243,16 +243,16 @@ impl Canvas {
         for slots in list.flat_map(|piece| piece.chunks(FETCHED)) {
             queue.fill(splats, slots, tile, &coordinates, open);
             for at in 0..queue.len {
-                let opacity = queue.place(at).0.opacity;
+                let opacity = queue.block(at).0.opacity;
                 alphas(&mut queue.lanes[at % QUEUED], opacity);
             }
             let mut any_finished = false;
             for at in 0..queue.len {
-                let (splat, column, row) = queue.place(at);
+                let (splat, column, row) = queue.block(at);
                 let alpha = &queue.lanes[at % QUEUED];
                 let (counts, finished) = blend::<BACKGROUND>(&mut blocks[column][row], splat, alpha);
                 if counts {
-                    let [_, column, row] = queue.places[at % QUEUED];
+                    let [_, column, row] = queue.blocks[at % QUEUED];
                     watch.counts(splat, [column, row], alpha);
                 }
                 open[column][row] = !finished;

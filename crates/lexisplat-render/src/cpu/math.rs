@@ -1,4 +1,4 @@
-//! Mathematical functions that give the same bits on every machine. Those of the operating system do not.
+//! Mathematical functions that give the same bits on every machine. The operating system's functions do not.
 
 /// Bounds of the range of `exp`. Below `EXP_MIN` the result is 0, and above [`EXP_MAX`] it is infinite, because it leaves
 /// the normal `f32` range.

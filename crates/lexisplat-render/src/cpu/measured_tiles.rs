@@ -103,7 +103,7 @@ impl KeptView {
         order.sort(visible);
         let [band] = tiles::bands(order, projection.grid, tiles::MAX_ENTRIES).try_into().ok()?;
         let splats = order.keys.iter().map(|&(_, slot)| visible.slots[slot as usize]).collect();
-        // Splats are numbered by their places in `splats` from here on.
+        // Splats are numbered by their indices in `splats` from here on.
         for (number, (_, slot)) in (0..).zip(&mut order.keys) {
             *slot = number;
         }

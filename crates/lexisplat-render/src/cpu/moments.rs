@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// A splat can finish pixels without showing in any. What lies behind shows in the other pixels alone.
+    /// A splat can finish pixels without showing in any. Splats behind it show in the other pixels alone.
     #[test]
     fn what_finishes_a_pixel_without_showing_counts() {
         // Light left: 0.01, then 0.0005. 0.9 of that would leave less than the least transmittance.

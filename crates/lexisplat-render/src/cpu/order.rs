@@ -35,7 +35,7 @@ impl Order {
         });
     }
 
-    /// Returns the slots of the splats at places `range.start` to before `range.end`, and the pixels that they may touch.
+    /// Returns the slots of the splats at ranks `range.start` to before `range.end`, and the pixels that they may touch.
     pub(super) fn splats(&self, range: Range<usize>) -> impl Iterator<Item = (u32, PixelRect)> {
         let slots = self.keys[range.clone()].iter().map(|key| key.1);
         slots.zip(self.spare[range].iter().map(|words| PixelRect::from_words(*words)))

@@ -48,8 +48,8 @@ impl PixelRect {
 
     #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
     pub(super) fn from_words((min, max): (u32, u32)) -> Self {
-        let place = |word: u32| [word as u16, (word >> u16::BITS) as u16];
-        Self { min: place(min), max: place(max) }
+        let corner = |word: u32| [word as u16, (word >> u16::BITS) as u16];
+        Self { min: corner(min), max: corner(max) }
     }
 }
 

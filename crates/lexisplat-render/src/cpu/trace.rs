@@ -18,7 +18,7 @@ pub(super) struct Trace {
 /// One splat in one block.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mark {
-    /// Place of the splat in the trace.
+    /// Index of the splat in the trace.
     pub(super) splat: u32,
     /// Column and row of the block in the tile.
     pub(super) block: [u8; 2],

@@ -10,7 +10,7 @@ use super::device::Gpu;
 use super::part::{ScenePart, word, words};
 use super::part_layout::{Section, ShKind};
 
-/// Number of words for the place and the counts of a group of Gaussians.
+/// Number of words for the offset and the counts of a group of Gaussians.
 const GROUP_WORDS: usize = COLUMN_WORDS as usize;
 
 /// The buffers of a run of Gaussians, and the numbers that describe them to kernels.
@@ -19,9 +19,9 @@ pub(super) struct ChunkBuffers {
     /// Number of Gaussians.
     pub(super) count: u32,
     pub(super) escapes: u32,
-    /// Place in the columns where the numbers of the escaped Gaussians begin.
+    /// Offset in the columns where the numbers of the escaped Gaussians begin.
     pub(super) escapes_at: u32,
-    /// Place in the nonzeros where the exact rows of the escaped Gaussians begin.
+    /// Offset in the nonzeros where the exact rows of the escaped Gaussians begin.
     pub(super) exact_at: u32,
     pub(super) bodies: Buffer,
     pub(super) shapes: Buffer,
@@ -77,10 +77,10 @@ impl ScenePart<'_> {
     /// or of the part.
     fn run(&self, range: Range<usize>) -> Cut {
         let columns = self.section(Section::Columns);
-        let place = |i: usize| {
+        let offset = |i: usize| {
             let group = i.div_ceil(COLUMN_GROUP as usize);
-            let place = columns.get(4 * GROUP_WORDS * group..).and_then(word);
-            place.unwrap_or(self.outline.words) as usize
+            let offset = columns.get(4 * GROUP_WORDS * group..).and_then(word);
+            offset.unwrap_or(self.outline.words) as usize
         };
         let escaped = self.section(Section::Escaped);
         let before = |end: usize| {
@@ -88,7 +88,7 @@ impl ScenePart<'_> {
             escapes.partition_point(|&number| (u32::from_le_bytes(number) as usize) < end)
         };
         Cut {
-            words: place(range.start)..place(range.end),
+            words: offset(range.start)..offset(range.end),
             escapes: before(range.start)..before(range.end),
             gaussians: range,
         }
@@ -154,7 +154,7 @@ impl ScenePart<'_> {
         })
     }
 
-    /// Returns the places and counts of a run, then the numbers of its escaped Gaussians, counted from the start of the
+    /// Returns the offsets and counts of a run, then the numbers of its escaped Gaussians, counted from the start of the
     /// run.
     fn columns(&self, cut: &Cut) -> Vec<u32> {
         let group = COLUMN_GROUP as usize;
@@ -163,7 +163,7 @@ impl ScenePart<'_> {
         let own = bytes.get(4 * GROUP_WORDS * groups.start..4 * GROUP_WORDS * groups.end).unwrap_or_default();
         let mut columns: Vec<u32> = words(own).collect();
         let first = u32::try_from(cut.words.start).unwrap_or(u32::MAX);
-        columns.iter_mut().step_by(GROUP_WORDS).for_each(|place| *place -= first);
+        columns.iter_mut().step_by(GROUP_WORDS).for_each(|offset| *offset -= first);
         let escaped = words(self.section(Section::Escaped));
         let first = u32::try_from(cut.gaussians.start).unwrap_or(u32::MAX);
         let own = escaped.skip(cut.escapes.start).take(cut.escapes.len());

@@ -15,7 +15,7 @@ use super::constants::{COLUMN_GROUP, ESCAPED};
 /// The codes of a run of Gaussians.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
-    /// Places and counts of the groups.
+    /// Offsets and counts of the groups.
     pub(super) columns: Vec<u32>,
     /// The numbers of the escaped Gaussians within the run.
     pub(super) escaped: Vec<u32>,

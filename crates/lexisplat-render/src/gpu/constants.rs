@@ -32,9 +32,9 @@ pub(super) const SORT_BLOCK: u32 = GROUP * SORT_ITEMS;
 const MOMENT_SPLATS: u32 = 4;
 /// Number of splats that a workgroup reads at once to sum moments. With the sums they just fit in workgroup memory.
 const MOMENT_BATCH: u32 = 64;
-/// Number of Gaussians whose codes share one stored place.
+/// Number of Gaussians whose codes share one stored offset.
 pub(super) const COLUMN_GROUP: u32 = 16;
-/// Number of words for such a group: the place, and a byte for each Gaussian.
+/// Number of words for such a group: the offset, and a byte for each Gaussian.
 pub(super) const COLUMN_WORDS: u32 = 1 + COLUMN_GROUP / 4;
 /// Value of the byte of a Gaussian that is stored exactly. Other bytes are counts, which are at most 72.
 pub(super) const ESCAPED: u32 = 0x80;
@@ -59,7 +59,7 @@ const FAR_LIMIT: f32 = 3e38;
 /// Value of a colour that overflows. Other colours are not negative.
 const NO_COLOUR: f32 = -1.0;
 
-/// Numbers that the GPU counts. Their values are places in the buffer of counters.
+/// Numbers that the GPU counts. Their values are indices in the buffer of counters.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counter {
     /// Number of Gaussians that may be visible. If each band searches for its own Gaussians: that number in the fullest
@@ -88,7 +88,7 @@ pub(super) enum Counter {
 /// Number of words of the buffer of counters.
 pub(super) const COUNTERS: usize = 16;
 
-/// Dispatches whose sizes the GPU computes. Their values are places in the buffer of their arguments.
+/// Dispatches whose sizes the GPU computes. Their values are indices in the buffer of their arguments.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Dispatch {
     /// A lane for each slot, and one more lane.
@@ -210,7 +210,7 @@ pub(super) fn vectors(coefficients: usize) -> usize {
 }
 
 /// Returns statements that read `coefficients` coefficients of three channels from vectors of four floats. `load` makes
-/// an expression from the place of a vector. `each` makes a statement from the number and the expression of a
+/// an expression from the index of a vector. `each` makes a statement from the number and the expression of a
 /// coefficient.
 fn for_each_coefficient(
     coefficients: usize,

@@ -15,7 +15,7 @@ const NO_ADAPTER: &str = "no GPU adapter was found; install a Vulkan driver and 
 /// An adapter that this machine offers.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct AdapterSummary {
-    /// Place in the list of adapters, best first. It is the number that [`Device::Index`] takes.
+    /// Index in the list of adapters, best first. It is the number that [`Device::Index`] takes.
     pub index: usize,
     /// Name of the adapter, from the driver.
     pub name: String,

@@ -7,7 +7,7 @@
 //! entries of each tile together. `blend` draws the tiles. Only the GPU knows the numbers of slots and entries, so it
 //! sizes its own dispatches. A buffer that turns out too small is made larger, and the picture is drawn again.
 //!
-//! To measure sensitivities, the second sort moves the places of entries in the lists instead of their slots. After
+//! To measure sensitivities, the second sort moves the indices of entries in the lists instead of their slots. After
 //! `blend`, `moments` sums how the splat of each entry changes the tile, and `gather_moments` adds up the entries of each
 //! splat. All sums have a fixed order. The processor carries the sums over to the world.
 //!

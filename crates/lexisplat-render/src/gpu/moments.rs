@@ -16,7 +16,7 @@ pub(super) const MOMENTS_BYTES: u64 = size_of::<Moments>() as u64;
 #[derive(Debug)]
 pub(super) struct MomentBuffers {
     /// Slot of each entry, in the order in which the entries are listed. While sensitivities are measured, the sort moves
-    /// the places of entries in this list instead of their slots.
+    /// the indices of entries in this list instead of their slots.
     pub(super) listed_slots: Buffer,
     /// Moments of each entry, in the order in which the entries are listed.
     pub(super) of_entries: Buffer,

@@ -4,21 +4,21 @@ use super::constants::{COLUMN_GROUP, COLUMN_WORDS, ESCAPED};
 use super::part::{ScenePart, word, words};
 use super::part_layout::{Section, ShKind};
 
-/// Number of bytes of the place and the counts of a group of Gaussians.
+/// Number of bytes of the offset and the counts of a group of Gaussians.
 const GROUP_BYTES: usize = 4 * COLUMN_WORDS as usize;
 
 impl ScenePart<'_> {
-    /// Checks the places, counts, atom numbers and escapes of sparse codes. The error tells what is wrong.
+    /// Checks the offsets, counts, atom numbers and escapes of sparse codes. The error tells what is wrong.
     pub(super) fn check_codes(&self) -> Result<(), String> {
         let ShKind::Codes { index, value, atoms } = self.outline.layout.kind else { return Ok(()) };
         let most = self.outline.layout.degree.rest();
         let nonzeros = self.section(Section::Nonzeros);
         let mut escaped = words(self.section(Section::Escaped));
-        // Place of the group's nonzeros, in words.
+        // Offset of the group's nonzeros, in words.
         let mut at = 0_usize;
         let groups = self.section(Section::Columns).chunks_exact(GROUP_BYTES);
         for (group, first) in groups.zip((0_u32..).step_by(COLUMN_GROUP as usize)) {
-            if word(group).is_none_or(|place| place as usize != at) {
+            if word(group).is_none_or(|offset| offset as usize != at) {
                 return Err(format!("codes of Gaussian {first} begin at another word than {at}"));
             }
             let mut total = 0;

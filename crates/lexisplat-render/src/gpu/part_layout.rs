@@ -47,7 +47,7 @@ pub(super) enum Section {
     Shapes,
     /// Dense rows; or base colours, of three floats each.
     Colours,
-    /// Places and counts of codes, as described in [`super::columns`].
+    /// Offsets and counts of codes, as described in [`super::columns`].
     Columns,
     /// Numbers of the escaped Gaussians within the part.
     Escaped,
@@ -128,7 +128,7 @@ impl Outline {
         4 * HEADER_WORDS as u64 + arrays
     }
 
-    /// Returns the place of an array, in bytes. [`Self::bytes`] must fit in memory.
+    /// Returns the offset of an array, in bytes. [`Self::bytes`] must fit in memory.
     pub(super) fn section(&self, section: Section) -> Range<usize> {
         let sizes = self.sizes();
         let before = sizes[..section as usize].iter().map(|size| size.next_multiple_of(ALIGNMENT));

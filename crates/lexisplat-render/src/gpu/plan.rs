@@ -100,7 +100,7 @@ pub(super) struct Step {
 pub(super) enum Size {
     /// A fixed number.
     Groups(u32),
-    /// A number that the GPU computes. The value is its place in the buffer of dispatches, in bytes.
+    /// A number that the GPU computes. The value is its offset in the buffer of dispatches, in bytes.
     Indirect(u64),
 }
 
@@ -122,7 +122,7 @@ impl Size {
 #[path = "tests/scan_sort.rs"]
 mod tests;
 
-/// The buffers of a sort, and the places of the numbers that it needs.
+/// The buffers of a sort, and the offsets of the numbers that it needs.
 struct Sorting<'a> {
     keys: [&'a Buffer; 2],
     values: [&'a Buffer; 2],
@@ -133,7 +133,7 @@ struct Sorting<'a> {
     digits: Counter,
     groups: Dispatch,
     scan_groups: Dispatch,
-    /// Whether the values begin as the places of their keys. The buffer of values is then not read.
+    /// Whether the values begin as the indices of their keys. The buffer of values is then not read.
     identity: bool,
 }
 

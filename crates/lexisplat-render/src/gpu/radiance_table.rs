@@ -92,8 +92,8 @@ impl RadianceTable {
 /// Returns the direction of the texel at `column` and `row` of face number `face`.
 fn direction(face: u32, column: u32, row: u32) -> [f32; 3] {
     #[expect(clippy::cast_precision_loss, reason = "sides are small")]
-    let place = |k: u32| k as f32 / (TABLE_SIDE - 1) as f32 * 2.0 - 1.0;
-    let (u, v) = (place(column), place(row));
+    let coordinate = |k: u32| k as f32 / (TABLE_SIDE - 1) as f32 * 2.0 - 1.0;
+    let (u, v) = (coordinate(column), coordinate(row));
     let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
     let d = match face / 2 {
         0 => [sign, u, v],
@@ -145,11 +145,11 @@ pub(super) fn sample(texels: &[[f16; 4]], atom: usize, d: [f32; 3]) -> [f32; 3] 
     let face = 2 * axis + usize::from(d[axis] < 0.0);
     let side = TABLE_SIDE as usize;
     #[expect(clippy::cast_precision_loss, reason = "sides are small")]
-    let place = on_face.map(|v| (v * 0.5 + 0.5) * (side - 1) as f32);
+    let texel = on_face.map(|v| (v * 0.5 + 0.5) * (side - 1) as f32);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the side")]
-    let low = place.map(|v| (v as usize).min(side - 2));
+    let low = texel.map(|v| (v as usize).min(side - 2));
     #[expect(clippy::cast_precision_loss, reason = "sides are small")]
-    let part = [place[0] - low[0] as f32, place[1] - low[1] as f32];
+    let part = [texel[0] - low[0] as f32, texel[1] - low[1] as f32];
     let texel = |x: usize, y: usize| {
         let at = (atom * side + low[1] + y) * 6 * side + face * side + low[0] + x;
         texels[at].map(f16::to_f32)

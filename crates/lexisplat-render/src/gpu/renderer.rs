@@ -328,7 +328,7 @@ impl GpuRenderer {
         self.plans.retain(Plan::is_of_use);
         let known = self.plans.iter().position(|plan| plan.scene == scene.id && plan.shape == shape);
         let plan = match known {
-            Some(place) => self.plans.remove(place),
+            Some(index) => self.plans.remove(index),
             None => Plan::new(gpu, &self.kernels, scene, work, shape).await?,
         };
         let uniform = frame_uniform(scene, camera, options, degree, shape, work.capacity);
@@ -347,7 +347,7 @@ impl GpuRenderer {
                 timed.push(stage.stage);
             }
             if stage.stage == DrawStage::Cull {
-                // `cull` does not write the place after that of the last block.
+                // `cull` does not write the entry after that of the last block.
                 encoder.clear_buffer(&work.starts.raw, 4 * u64::from(scene.blocks()), Some(4));
             }
             if stage.stage == DrawStage::Tiles {
@@ -454,7 +454,7 @@ fn picture_key(scene: &GpuScene, camera: &Camera) -> PictureKey {
     (scene.id, camera.width, camera.height)
 }
 
-/// What a view lacked: larger buffers, or smaller bands.
+/// The need of a view that could not be drawn: larger buffers, or smaller bands.
 enum Missing {
     Capacity {
         slots: u32,

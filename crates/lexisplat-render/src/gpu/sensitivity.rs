@@ -54,7 +54,7 @@ impl GpuRenderer {
             return Err(Error::parameter("geometry", geometry.len(), expected));
         }
         let mut measuring = self.measuring().await?;
-        let places = places(scene);
+        let first_indices = first_indices(scene);
         let mut total = Sensitivity::zeros(geometry.len());
         let mut sums = vec![Moments::default(); geometry.len()];
         progress.begin(Stage::Draw, cameras.len() as u64);
@@ -63,7 +63,7 @@ impl GpuRenderer {
             let frame = measuring.draw_async(scene, camera, &RenderOptions::default()).await?;
             let (gaussians, moments) = measuring.read_moments(frame.stats.visible).await?;
             for (gaussian, moments) in gaussians.into_iter().zip(moments) {
-                sums[place(&places, gaussian)] = moments;
+                sums[index(&first_indices, gaussian)] = moments;
             }
             let projection = Projection::new(&camera.clone().with_tiles(None), scene.antialiased);
             carry(&mut total, &projection, geometry, cameras.len(), &mut sums);
@@ -116,21 +116,21 @@ impl GpuRenderer {
     }
 }
 
-/// Returns for each chunk the number that kernels give its first Gaussian, and the place of that Gaussian in the scene.
-fn places(scene: &GpuScene) -> Vec<[u32; 2]> {
-    let mut place = 0;
+/// Returns for each chunk the number that kernels give its first Gaussian, and the index of that Gaussian in the scene.
+fn first_indices(scene: &GpuScene) -> Vec<[u32; 2]> {
+    let mut index = 0;
     let of_chunk = |chunk: ChunkUniform| {
-        let own = [chunk.first, place];
-        place += chunk.count;
+        let own = [chunk.first, index];
+        index += chunk.count;
         own
     };
     scene.numbering().into_iter().map(of_chunk).collect()
 }
 
-/// Returns the place in the scene of the Gaussian with the kernels' number `number`.
-fn place(places: &[[u32; 2]], number: u32) -> usize {
-    let chunk = places.partition_point(|[first, _]| *first <= number).saturating_sub(1);
-    places.get(chunk).map_or(number, |[first, place]| number - first + place) as usize
+/// Returns the index in the scene of the Gaussian with the kernels' number `number`.
+fn index(first_indices: &[[u32; 2]], number: u32) -> usize {
+    let chunk = first_indices.partition_point(|[first, _]| *first <= number).saturating_sub(1);
+    first_indices.get(chunk).map_or(number, |[first, index]| number - first + index) as usize
 }
 
 #[cfg(test)]

@@ -59,7 +59,7 @@ pub(crate) fn read_nerf_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<
 
 /// Returns the cameras in `bytes`, in order. Their names are their `file_path` as written. Errors call the bytes `file`.
 ///
-/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`. Those of a frame take
+/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`. Focal lengths of a frame take
 /// precedence over those of the file. If only x has a focal length, it holds for both axes. If `w` or `h` is missing,
 /// `size_of` is asked with the `file_path`. The principal point is ignored, see [`ViewSet::warnings`]. `train_filenames`
 /// and `test_filenames` set the split. If there are no `test_filenames`, `val_filenames` count as test, as in

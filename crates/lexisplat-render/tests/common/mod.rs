@@ -1,4 +1,4 @@
-//! What the integration tests share: reading real models and photos, and PSNR.
+//! Functions that the integration tests share: reading real models and photos, and PSNR.
 #![allow(dead_code, reason = "each test file uses a part")]
 
 use lexisplat::{Splats, ply};

@@ -70,7 +70,7 @@ mod tests {
         all.iter().map(|(class, text)| Part { class, what: class, png: (*text).into() }).collect()
     }
 
-    /// What every page must be.
+    /// Checks the rules of every page.
     fn check(page: &str) {
         check_nesting(page);
         assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));

@@ -256,7 +256,7 @@ mod tests {
         assert_eq!(latex.matches('{').count(), latex.matches('}').count());
     }
 
-    /// What this crate itself writes beyond ASCII must not need another engine.
+    /// Characters beyond ASCII that this crate itself writes must not need another engine.
     #[test]
     fn typography_is_spelled_in_ascii() {
         assert_eq!(

@@ -35,12 +35,12 @@ impl SceneRenderer for GpuSceneRenderer {
     }
 
     fn set(&mut self, slot: Slot, model: Option<Arc<OpenModel>>) -> Result<()> {
-        let place = &mut self.scenes[slot.index()];
+        let held = &mut self.scenes[slot.index()];
         // The old model is freed first, because there may be no memory for both.
-        *place = None;
+        *held = None;
         if let Some(model) = model {
             let scene = model.scene.scene();
-            *place = Some(GpuScene::new(&self.gpu, &scene, ShPath::of(&scene))?);
+            *held = Some(GpuScene::new(&self.gpu, &scene, ShPath::of(&scene))?);
         }
         Ok(())
     }

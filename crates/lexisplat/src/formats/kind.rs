@@ -12,7 +12,7 @@ const LEXI_EXTENSION: &str = ".lexi";
 const CONVERT: &str = "'lexisplat convert' makes a PLY of it, and the crate lexisplat-formats reads it";
 /// The mark of UTF-8 that some editors put before text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-/// The place of the JSON header in a safetensors file: after its length, a u64.
+/// The offset of the JSON header in a safetensors file: after its length, a u64.
 const JSON_OFFSET: usize = 8;
 
 /// Returns `bytes` without the mark of UTF-8 that some editors put before text.

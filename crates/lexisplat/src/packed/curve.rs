@@ -12,7 +12,7 @@ const CELLS_PER_GAUSSIAN: f64 = 3000.0;
 /// Share of the positions at each end of each axis that are not part of the bulk.
 const TRIM: f64 = 0.01;
 
-/// The place of a Gaussian in a packed scene. Keys are compared by cell, then by index.
+/// The key by which the Gaussians of a packed scene are sorted. Keys are compared by cell, then by index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct MortonKey {
     pub(crate) cell: u64,

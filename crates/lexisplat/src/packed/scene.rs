@@ -62,7 +62,7 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Creates a packed scene. `extras` are in the order of the file. `order` holds the place in the source of each
+    /// Creates a packed scene. `extras` are in the order of the file. `order` holds the index in the source of each
     /// Gaussian of the file.
     pub(crate) fn new(head: PackedHead, extras: Vec<Extra>, order: Option<Vec<u32>>, data: Vec<u8>) -> Self {
         Self { head, extras, order, data }
@@ -92,7 +92,7 @@ impl Packed {
         &self.extras
     }
 
-    /// Returns the place in the source of each Gaussian of the file. `None` if the order was not kept.
+    /// Returns the index in the source of each Gaussian of the file. `None` if the order was not kept.
     #[must_use]
     pub fn order(&self) -> Option<&[u32]> {
         self.order.as_deref()
@@ -152,7 +152,7 @@ impl Packed {
 #[derive(Debug)]
 pub(crate) struct SpilledPacked {
     pub(crate) data: Woven,
-    /// For each layer, its number of Gaussians, and their places in the source.
+    /// For each layer, its number of Gaussians, and their indices in the source.
     pub(crate) order: Option<Vec<(usize, Spilled)>>,
     /// For each property that 3DGS does not define, its name and type, and for each layer the number of Gaussians and their
     /// values.

@@ -1,7 +1,7 @@
 //! Real spherical harmonics as 3DGS uses them: degrees, coefficient layout, basis values.
 //!
 //! A Gaussian of degree `l` has `(l + 1)^2` coefficients in each channel. The first coefficient, DC, is kept apart. The
-//! others form the SH-rest vector, which this project compresses. That vector is **channel-major**, as `f_rest_*` in a PLY:
+//! others form the SH-rest vector, which this project compresses. The vector is **channel-major**, as `f_rest_*` in a PLY:
 //! all of red, then all of green, then all of blue (INRIA `gaussian_model.py`, `save_ply`, `transpose(1, 2).flatten`).
 
 use serde::{Deserialize, Serialize};

@@ -223,7 +223,7 @@ fn activated(lint: &Lint) -> Vec<String> {
         );
     }
     // If these values were logarithms, no size would be below 1 unit, and the geometric mean of the sizes would be below e
-    // units. That would be a scene of boulders.
+    // units. Such a scene would be of boulders.
     if !scales.is_empty() && scales.iter().all(|a| a.min > 0.0 && a.mean < 1.0) {
         out.push(
             "All scales are above 0 and small: they look as if they were activated already. A PLY holds logarithms of sizes, whose \

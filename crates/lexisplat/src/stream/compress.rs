@@ -43,7 +43,7 @@ impl Compressed {
 /// [`LexiWriter::exact`].
 ///
 /// # Errors
-/// Those of these two functions, and [`crate::Error::Io`] for temporary files.
+/// Errors of these two functions, and [`crate::Error::Io`] for temporary files.
 pub fn compress<'a>(
     source: &dyn SplatSource,
     options: &CompressOptions,

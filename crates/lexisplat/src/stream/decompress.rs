@@ -12,7 +12,7 @@ use crate::support::sink::Sink;
 /// and [`ply::write`](crate::formats::ply::write()). Returns their number.
 ///
 /// # Errors
-/// Those of these two functions; [`crate::Error::Io`] for temporary files, which a packed file with its source's order
+/// Errors of these two functions; [`crate::Error::Io`] for temporary files, which a packed file with its source's order
 /// needs; [`crate::Error::Cancelled`].
 pub fn decompress<'a>(
     lexi: &LexiReader<'_>,

@@ -12,7 +12,7 @@ pub trait Observer<E = Error> {
     /// Measures how pictures of `part` depend on its values, and which step the part asks for.
     ///
     /// # Errors
-    /// Those of drawing.
+    /// Errors of drawing.
     fn observe(&mut self, part: &Splats) -> Result<Observed, E>;
 
     /// Returns the base colours and opacities with which pictures of `model` are nearest to those of `part`; `None`
@@ -21,7 +21,7 @@ pub trait Observer<E = Error> {
     /// if the options let these values change.
     ///
     /// # Errors
-    /// Those of drawing.
+    /// Errors of drawing.
     fn refit(
         &mut self,
         _part: &Splats,

@@ -62,11 +62,10 @@ impl Ordered {
         let records = if last { self.buckets.take(number)? } else { self.buckets.read(number)? };
         let width = KEY_BYTES + self.rows.bytes();
         let count = records.len() / width;
-        let (mut rows, mut places) =
-            (Vec::with_capacity(count * self.rows.bytes()), Vec::with_capacity(count));
+        let (mut rows, mut keys) = (Vec::with_capacity(count * self.rows.bytes()), Vec::with_capacity(count));
         for record in records.chunks_exact(width) {
             let (key, row) = record.split_at(KEY_BYTES);
-            places.push(MortonKey {
+            keys.push(MortonKey {
                 cell: key.first_chunk().map_or(0, |c| u64::from_le_bytes(*c)),
                 source: key[8..].first_chunk().map_or(0, |s| u32::from_le_bytes(*s)),
             });
@@ -74,7 +73,7 @@ impl Ordered {
         }
         drop(records);
         let mut reader = BucketReader::new(plan, number);
-        reader.add_rows(&self.rows, &rows, places);
+        reader.add_rows(&self.rows, &rows, keys);
         drop(rows);
         Ok(reader.finish())
     }

@@ -179,23 +179,23 @@ fn in_buckets<E: From<Error>>(
 struct Messages {
     file: Temporary,
     /// The start and the length of each message.
-    places: Vec<(u64, usize)>,
+    spans: Vec<(u64, usize)>,
 }
 
 impl Messages {
     fn new(to: SpillTo<'_>) -> Result<Self> {
-        Ok(Self { file: Temporary::new(to)?, places: Vec::new() })
+        Ok(Self { file: Temporary::new(to)?, spans: Vec::new() })
     }
 
     /// Adds the message of the next bucket.
     fn push(&mut self, message: &[u8]) -> Result<()> {
-        self.places.push((self.file.append(message)?, message.len()));
+        self.spans.push((self.file.append(message)?, message.len()));
         Ok(())
     }
 
     /// Returns the message of bucket `number`; empty if there is none.
     fn read(&mut self, number: usize) -> Result<Vec<u8>> {
-        let (start, length) = self.places.get(number).copied().unwrap_or_default();
+        let (start, length) = self.spans.get(number).copied().unwrap_or_default();
         let mut message = vec![0; length];
         self.file.read_at(start, &mut message)?;
         Ok(message)

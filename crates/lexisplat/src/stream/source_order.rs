@@ -13,10 +13,10 @@ use crate::support::error::Result;
 
 /// Number of Gaussians of a bucket.
 const BUCKET: usize = 1 << 17;
-/// Number of places that are read at once. They are whole blocks of their column, so each block is decoded once.
-const PLACES_AT_ONCE: usize = 1 << 16;
-/// Number of bytes of a Gaussian's place, which comes before its values.
-const PLACE_BYTES: usize = 4;
+/// Number of indices that are read at once. They are whole blocks of their column, so each block is decoded once.
+const INDICES_AT_ONCE: usize = 1 << 16;
+/// Number of bytes of a Gaussian's index, which comes before its values.
+const INDEX_BYTES: usize = 4;
 
 /// Calls `take` with the parts of the dense scene of `lexi`, one after the other. They are in the order of the source if
 /// the file holds it, otherwise in the order of the file. Temporary files, if any are needed, are in `folder`.
@@ -63,20 +63,20 @@ fn by_buckets(
     let rows = RowLayout::new(lexi.empty());
     let mut buckets = Buckets::new(folder, n.div_ceil(bucket_len))?;
     let mut bytes = Vec::new();
-    // The places of the Gaussians to come, and the number of places that were read.
-    let (mut places, mut read) = (Vec::new(), 0);
+    // The indices of the Gaussians to come, and the number of indices that were read.
+    let (mut indices, mut read) = (Vec::new(), 0);
     let bits = lexi.parts(count_bits, &mut |_, model| {
         see(&model);
         let mut splats = model.into_splats();
         rows.pack(&mut splats, &mut bytes);
-        while places.len() < splats.len() && read < n {
-            let range = read..n.min(read + PLACES_AT_ONCE);
+        while indices.len() < splats.len() && read < n {
+            let range = read..n.min(read + INDICES_AT_ONCE);
             read = range.end;
-            places.extend(lexi.order(range)?);
+            indices.extend(lexi.order(range)?);
         }
-        let own = places.drain(..splats.len().min(places.len()));
-        for (row, place) in bytes.chunks_exact(rows.bytes()).zip(own) {
-            buckets.push(place as usize / bucket_len, &[&place.to_le_bytes(), row])?;
+        let own = indices.drain(..splats.len().min(indices.len()));
+        for (row, index) in bytes.chunks_exact(rows.bytes()).zip(own) {
+            buckets.push(index as usize / bucket_len, &[&index.to_le_bytes(), row])?;
         }
         Ok(())
     })?;
@@ -85,10 +85,10 @@ fn by_buckets(
         let count = bucket_len.min(n - start);
         bytes.clear();
         bytes.resize(count * rows.bytes(), 0);
-        for record in buckets.take(bucket)?.chunks_exact(PLACE_BYTES + rows.bytes()) {
-            let (place, row) = record.split_at(PLACE_BYTES);
-            let place = place.first_chunk().map_or(0, |p| u32::from_le_bytes(*p)) as usize - start;
-            bytes[place * rows.bytes()..][..row.len()].copy_from_slice(row);
+        for record in buckets.take(bucket)?.chunks_exact(INDEX_BYTES + rows.bytes()) {
+            let (index, row) = record.split_at(INDEX_BYTES);
+            let index = index.first_chunk().map_or(0, |p| u32::from_le_bytes(*p)) as usize - start;
+            bytes[index * rows.bytes()..][..row.len()].copy_from_slice(row);
         }
         take(rows.unpack(&bytes))?;
     }

@@ -35,7 +35,7 @@ pub struct Survey {
 /// Computes [`lint`](crate::scene::stats::lint()) of a scene that is read a part at a time.
 ///
 /// # Errors
-/// Those of [`SplatSource::read`], and [`crate::Error::Cancelled`].
+/// As [`SplatSource::read`], and [`crate::Error::Cancelled`].
 pub fn lint(source: &dyn SplatSource, progress: &dyn Progress) -> Result<Lint> {
     let mut linter = Linter::default();
     let mut splats = source.empty();
@@ -49,7 +49,7 @@ pub fn lint(source: &dyn SplatSource, progress: &dyn Progress) -> Result<Lint> {
 /// Decodes a .lexi file and computes its statistics. Temporary files, if any are needed, are in `folder`.
 ///
 /// # Errors
-/// Those of [`in_source_order`](super::in_source_order).
+/// As [`in_source_order`](super::in_source_order).
 pub fn survey(lexi: &LexiReader<'_>, folder: &Path) -> Result<Survey> {
     let mut linter = Linter::default();
     linter.add(&lexi.empty())?;

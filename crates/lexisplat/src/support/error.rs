@@ -118,10 +118,11 @@ pub enum FormatError {
         property: String,
     },
     /// A stored checksum does not match the bytes.
-    #[error("checksum of '{part}' does not match: the file is damaged")]
+    #[error("checksum of '{covered}' does not match: the file is damaged")]
     Checksum {
-        /// The tensor, or `header`.
-        part: String,
+        /// The name of the bytes that the checksum covers: a tensor, `header`, a range of a chunk, the integers of a range,
+        /// or a member of an archive.
+        covered: String,
     },
     /// The file was written by a newer version of the format.
     #[error(

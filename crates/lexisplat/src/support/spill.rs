@@ -13,7 +13,7 @@ use crate::support::error::{Error, Result};
 /// Number of bytes of the write buffer, and of a block that is copied at a time.
 const BUFFER: usize = 1 << 18;
 
-/// The place where spilled bytes are kept.
+/// The storage of spilled bytes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum SpillTo<'a> {
     Memory,

@@ -41,7 +41,7 @@ fn count(bytes: usize) {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// What `work` returns, and the most bytes that were allocated on top of what was before, by the whole
+/// Returns the result of `work`, and the most bytes that were allocated on top of what was before, by the whole
 /// process.
 pub(crate) fn counted<T>(work: impl FnOnce() -> T) -> (T, usize) {
     let before = LIVE.load(Relaxed);

@@ -15,11 +15,11 @@ use lexisplat::packed::Packed;
 use lexisplat::ply::{self, PlySource, ReadOptions};
 use lexisplat::{Error, Input, Layout, Limits, Result, Silent, SplatSource, stream};
 
-/// What every file here is called.
+/// The name of every file here.
 const NAME: &str = "a file.ext";
 /// Gaussians of a file whose arrays are megabytes.
 const MANY: usize = 120_000;
-/// What a reader may allocate before it refuses such a file: scratch for 65,536 Gaussians of four values, as
+/// Bytes that a reader may allocate before it refuses such a file: scratch for 65,536 Gaussians of four values, as
 /// values and as bits, and threads.
 const SCRATCH: usize = 3 << 20;
 
@@ -189,7 +189,7 @@ fn refused_before_allocation() {
     assert!(result.is_ok() && used > plain, "the counter does not count");
 }
 
-/// What cannot be mapped is read no further than is needed to refuse it.
+/// A file that cannot be mapped is read no further than is needed to refuse it.
 fn pipes() {
     struct Endless(Cell<usize>);
     impl std::io::Read for &Endless {

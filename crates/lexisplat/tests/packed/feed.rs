@@ -29,7 +29,7 @@ fn outline(file: &[u8]) -> Outline {
     LexiReader::open(NAME, file, &Limits::default()).unwrap().outline().unwrap().clone()
 }
 
-/// What each chunk of `reader` decodes to.
+/// Returns the decoded chunks of `reader`.
 fn chunks(reader: &LexiReader<'_>) -> Vec<Model> {
     let mut chunks = Vec::new();
     reader
@@ -57,10 +57,10 @@ fn fill(feed: &mut LexiFeed, file: &[u8]) {
 }
 
 fn give(feed: &mut LexiFeed, file: &[u8], range: Range<u64>) -> Result<()> {
-    feed.feed(range.start, &file[place(range.start)..place(range.end)])
+    feed.feed(range.start, &file[index(range.start)..index(range.end)])
 }
 
-fn place(offset: u64) -> usize {
+fn index(offset: u64) -> usize {
     usize::try_from(offset).unwrap()
 }
 
@@ -82,7 +82,7 @@ fn the_scene_has_several_layers_and_chunks() {
     let mut end = outline.ranges[0].bytes.start;
     for range in &outline.ranges {
         assert_eq!((range.bytes.start, range.bytes.is_empty()), (end, false));
-        assert_eq!(crc32fast::hash(&file()[place(end)..place(range.bytes.end)]), range.checksum);
+        assert_eq!(crc32fast::hash(&file()[index(end)..index(range.bytes.end)]), range.checksum);
         end = range.bytes.end;
     }
 }
@@ -148,21 +148,21 @@ fn a_wrong_byte_is_found_in_its_range_and_asked_for_again() {
     let mut random = Random::new(3);
     for range in &outline.ranges {
         let mut damaged = file.to_vec();
-        let at = place(range.bytes.start) + random.below(place(range.bytes.end - range.bytes.start));
+        let at = index(range.bytes.start) + random.below(index(range.bytes.end - range.bytes.start));
         damaged[at] ^= 1 << random.below(8);
         let mut feed = feed(&FeedOptions::default());
-        let part = loop {
+        let covered = loop {
             let wanted = feed.wants().unwrap();
             match give(&mut feed, &damaged, wanted) {
                 Ok(()) => {}
-                Err(Error::Format { problem: FormatError::Checksum { part }, .. }) => break part,
+                Err(Error::Format { problem: FormatError::Checksum { covered }, .. }) => break covered,
                 Err(other) => panic!("{other}"),
             }
         };
-        assert!(part.ends_with(&format!("of chunk {}", range.chunk)), "{part}: {range:?}");
+        assert!(covered.ends_with(&format!("of chunk {}", range.chunk)), "{covered}: {range:?}");
         // The message of the reader of whole files is the same.
         let error = lexi::read_bytes(NAME, &damaged, &Limits::default()).unwrap_err().to_string();
-        assert!(error.contains(&format!("'{part}'")), "{error}: {part}");
+        assert!(error.contains(&format!("'{covered}'")), "{error}: {covered}");
         assert_eq!(feed.wants(), Some(range.bytes.clone()));
         fill(&mut feed, file);
         assert!(feed.is_complete());
@@ -172,7 +172,7 @@ fn a_wrong_byte_is_found_in_its_range_and_asked_for_again() {
 #[test]
 fn damage_at_the_start_is_found_before_any_range() {
     let file = file();
-    let start = place(outline(file).ranges[0].bytes.start);
+    let start = index(outline(file).ranges[0].bytes.start);
     let mut random = Random::new(5);
     for _ in 0..200 {
         let mut damaged = file.to_vec();
@@ -229,7 +229,7 @@ fn the_allowance_is_kept() {
     }
     assert!(models.into_iter().map(Option::unwrap).eq(whole));
 
-    // What is given beyond it is refused, and nothing of it taken.
+    // Bytes beyond it are refused, and none of them is taken.
     let mut tight = self::feed(&FeedOptions::default().with_most_bytes(start + 10));
     fill(&mut tight, file);
     assert!(tight.head().is_some() && !tight.is_complete() && tight.held_bytes() <= start + 10);
@@ -242,7 +242,7 @@ fn the_allowance_is_kept() {
     give(&mut none, file, 0..9).unwrap_err();
     assert!(matches!(none.feed(5000, &[0; 200]), Err(Error::Limit { .. })));
     assert!(none.held_bytes() <= 100);
-    // What is not asked for takes no room.
+    // Ranges that are not asked for take no room.
     let mut without = self::feed(&FeedOptions::default().with_sh_parts(0).with_most_bytes(start));
     fill(&mut without, file);
     let sh = outline.ranges.iter().find(|range| matches!(range.kind, RangeKind::Sh(_))).unwrap();
@@ -252,7 +252,7 @@ fn the_allowance_is_kept() {
     let inside = outline.ranges[0].bytes.start + 1;
     tight.feed(inside, &[]).unwrap();
     let mut open = self::feed(&FeedOptions::default());
-    open.feed(0, &file[..place(start)]).unwrap();
+    open.feed(0, &file[..index(start)]).unwrap();
     open.feed(inside, &[]).unwrap();
     assert_eq!((tight.held_bytes(), open.held_bytes()), (start, start));
 }
@@ -349,7 +349,7 @@ fn the_first_bytes_are_read_as_they_come() {
 #[test]
 fn first_bytes_without_a_head_are_refused() {
     let file = file();
-    let start = place(outline(file).ranges[0].bytes.start);
+    let start = index(outline(file).ranges[0].bytes.start);
     for len in [0, 5, 9, 200, start - 1] {
         let error = LexiReader::open_first(NAME, &file[..len], &Limits::default()).unwrap_err();
         assert!(len < 8 || error.to_string().contains("truncated"), "{len}: {error}");
@@ -385,7 +385,7 @@ fn extras_are_left_out_of_a_first_part() {
     let splats = with_extras(sample(500, 3, 1));
     let file = bytes(&pack(&splats, STEP, &options(|o| o.keep_order = true)).0);
     let end = outline(&file).ranges.last().unwrap().bytes.end;
-    let reader = LexiReader::open_first(NAME, &file[..place(end)], &Limits::default()).unwrap();
+    let reader = LexiReader::open_first(NAME, &file[..index(end)], &Limits::default()).unwrap();
     assert!(reader.empty().geometry.extras.is_empty() && !reader.order_kept());
     let model = reader.model().unwrap();
     assert_eq!(model.len(), 500);
@@ -396,7 +396,7 @@ fn extras_are_left_out_of_a_first_part() {
     assert_eq!(all.empty().geometry.extras.len(), 2);
 }
 
-/// What the header alone says must be right of tensors too that are not there yet.
+/// The header must also be right about tensors that are not there yet.
 #[test]
 fn tensors_that_are_not_there_yet_are_described_rightly() {
     let splats = with_extras(sample(500, 3, 1));
@@ -444,7 +444,7 @@ fn tensors_that_are_not_there_yet_are_described_rightly() {
 
 /// Where the header of a file ends.
 fn header_end(file: &[u8]) -> usize {
-    8 + place(u64::from_le_bytes(*file.first_chunk().unwrap()))
+    8 + index(u64::from_le_bytes(*file.first_chunk().unwrap()))
 }
 
 /// The file with other sums of its tensors, and a checksum of its head that fits.
@@ -453,7 +453,7 @@ fn with_sums(file: &[u8], sums: &str) -> Vec<u8> {
     let mut header: serde_json::Value = serde_json::from_slice(&text[8..]).unwrap();
     header["__metadata__"]["checksums"] = sums.into();
     let offsets = header["packed.head"]["data_offsets"].clone();
-    let at = |k: usize| place(offsets[k].as_u64().unwrap());
+    let at = |k: usize| index(offsets[k].as_u64().unwrap());
     let text = header.to_string();
     let mut new = [&(text.len() as u64).to_le_bytes(), text.as_bytes()].concat();
     let mut crc = crc32fast::Hasher::new();
@@ -471,7 +471,7 @@ fn interim_ranges_of_whole_files_have_right_checksums() {
     let mut file = file().to_vec();
     let outline = outline(&file);
     let range = outline.ranges.iter().find(|range| range.kind == RangeKind::Interim).unwrap();
-    file[place(range.bytes.start)] ^= 1;
+    file[index(range.bytes.start)] ^= 1;
     let error = LexiReader::open(NAME, &file[..], &Limits::default()).unwrap().model().unwrap_err();
     let last = outline.ranges.iter().filter(|other| other.chunk == range.chunk).count() - 1;
     assert!(error.to_string().contains(&format!("'range {last} of chunk {}'", range.chunk)), "{error}");

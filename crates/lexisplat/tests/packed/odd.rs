@@ -146,7 +146,7 @@ fn extreme_scales_end_at_the_limits() {
     assert!((long + 2.0).abs() < 0.5 && (middle + 11.0).abs() < 1.0 && (short + 11.0).abs() < 1.0);
 }
 
-/// What was too large to be drawn must not appear because sizes end at a limit.
+/// A Gaussian too large to be drawn must not appear because sizes end at a limit.
 #[test]
 fn what_is_too_large_to_be_drawn_stays_unseen() {
     for (scale, drawn) in [(30.0, true), (44.0, true), (45.0, false), (89.0, false), (f32::MAX, false)] {

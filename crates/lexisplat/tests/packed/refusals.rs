@@ -1,4 +1,4 @@
-//! What cannot be packed or unpacked is refused, and the error names it.
+//! Scenes that cannot be packed or unpacked are refused, and the error names the reason.
 
 use lexisplat::lexi::{self, LexiReader};
 use lexisplat::packed::{PackOptions, Packer};

@@ -136,7 +136,7 @@ fn streams_sum_to_the_data() {
         let streams = packed.stream_bits().unwrap();
         assert_eq!(streams.len(), 30);
         assert!(streams.iter().all(|s| s.bits >= 0.0));
-        // That of the dictionary is in the head.
+        // The stream of the dictionary is in the head.
         let sum: f64 = streams.iter().filter(|s| s.name != "Dictionary").map(|s| s.bits).sum();
         let data = packed.data().len() as f64 * 8.0;
         // Every lane of a range has a state and a length of 32 bits. A chunk has a lane for each 1024 Gaussians and at most

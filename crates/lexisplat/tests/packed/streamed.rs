@@ -29,7 +29,7 @@ fn outline() -> Outline {
     LexiReader::open(NAME, file(), &Limits::default()).unwrap().outline().unwrap().clone()
 }
 
-fn place(offset: u64) -> usize {
+fn index(offset: u64) -> usize {
     usize::try_from(offset).unwrap()
 }
 
@@ -39,7 +39,7 @@ fn streamed() -> StreamedScene {
 
 fn fill(scene: &mut StreamedScene, eye: &Eye, budget: &Budget) {
     while let Some(range) = scene.wants(eye, budget) {
-        scene.feed(range.start, &file()[place(range.start)..place(range.end)]).unwrap();
+        scene.feed(range.start, &file()[index(range.start)..index(range.end)]).unwrap();
     }
     scene.refresh().unwrap();
 }
@@ -149,12 +149,12 @@ fn a_part_that_came_is_drawn_as_by_a_feed_that_has_no_more() {
     let mut scene = streamed();
     let mut taken = Vec::new();
     while let Some(range) = scene.wants(&eye, &budget) {
-        scene.feed(range.start, &file()[place(range.start)..place(range.end)]).unwrap();
+        scene.feed(range.start, &file()[index(range.start)..index(range.end)]).unwrap();
         taken.push(range);
         scene.refresh().unwrap();
         let mut fresh = LexiFeed::new(NAME, &FeedOptions::default(), &Limits::default());
         for range in &taken {
-            fresh.feed(range.start, &file()[place(range.start)..place(range.end)]).unwrap();
+            fresh.feed(range.start, &file()[index(range.start)..index(range.end)]).unwrap();
         }
         assert_eq!(scene.chunks().map(|(c, _)| c).collect::<Vec<_>>(), fresh.ready());
         assert!(scene.chunks().all(|(c, model)| fresh.decode(c).unwrap().as_ref() == Some(model)));
@@ -168,7 +168,7 @@ fn steps_of_a_few_chunks_leave_no_hole() {
     let (mut whole, mut other, mut drawn) = (feed(), feed(), DrawnChunks::default());
     whole.feed(0, &file()[..1000]).unwrap();
     while let (None, Some(range)) = (whole.outline(), whole.wants()) {
-        whole.feed(range.start, &file()[place(range.start)..place(range.end)]).unwrap();
+        whole.feed(range.start, &file()[index(range.start)..index(range.end)]).unwrap();
     }
     other.feed(0, whole.start().unwrap()).unwrap();
     let mut random = Random::new(3);
@@ -187,7 +187,7 @@ fn steps_of_a_few_chunks_leave_no_hole() {
                 assert!(run.start <= first.start && first.start < run.end, "the first run is needed most");
             }
             for run in &runs {
-                whole.feed(run.start, &file()[place(run.start)..place(run.end)]).unwrap();
+                whole.feed(run.start, &file()[index(run.start)..index(run.end)]).unwrap();
             }
             let change = drawn.update(&whole, 2);
             change.removed.iter().for_each(|c| assert!(models.remove(c).is_some()));

@@ -65,7 +65,7 @@ struct Range {
     at: usize,
 }
 
-/// What a head says of layers, chunks and ranges, and where it says so.
+/// The layers, chunks and ranges of a head, and the positions of their numbers.
 #[derive(Clone, Default)]
 pub(crate) struct Index {
     /// Bytes of the head before it.
@@ -137,7 +137,7 @@ impl Head<'_> {
 }
 
 impl Index {
-    /// That of a file as it was written.
+    /// Returns the index of a file as it was written.
     pub(crate) fn of(parts: &mut Parts) -> Self {
         let data = parts.tensor("packed.data").unwrap().len() as u64;
         let head = parts.tensor("packed.head").unwrap();
@@ -147,7 +147,7 @@ impl Index {
         index
     }
 
-    /// What docs/FORMAT.md says of a head, which may be damaged.
+    /// Reads a head, which may be damaged, by the rules of docs/FORMAT.md.
     fn read(head: &[u8]) -> Option<Self> {
         let mut from = Head { bytes: head, at: SEAL, numbers: Vec::new() };
         from.number(false)?;
@@ -167,7 +167,7 @@ impl Index {
         let mut index = Self { start, tables, dictionary, levels, ..Self::default() };
         index.is_sorted = layers & SORTED > 0;
         let count = from.number(false)?;
-        let mut places = Vec::new();
+        let mut ids = Vec::new();
         for c in 0..count {
             let chunk = Chunk {
                 layer: from.byte()?,
@@ -178,11 +178,11 @@ impl Index {
             let levels = index.levels.get(usize::from(chunk.layer))?;
             let has_interim = interim && usize::from(chunk.layer) + 1 < index.levels.len();
             let kinds = 1 + usize::from(*levels) + parts + usize::from(has_interim);
-            places.extend((0..u8::try_from(kinds).ok()?).map(|kind| (c, kind)));
+            ids.extend((0..u8::try_from(kinds).ok()?).map(|kind| (c, kind)));
             index.chunks.push(chunk);
         }
-        for place in places {
-            let (chunk, kind) = if index.is_sorted { place } else { (from.number(false)?, from.byte()?) };
+        for id in ids {
+            let (chunk, kind) = if index.is_sorted { id } else { (from.number(false)?, from.byte()?) };
             let (length, at) = (from.number(false)?, from.at);
             index.ranges.push(Range { chunk, kind, length, sums: [from.sum()?, from.sum()?], at });
         }
@@ -251,7 +251,7 @@ impl Index {
                 0 => head[at] ^= 1 << random.below(8),
                 1 => head[at] = random.byte(),
                 2 => head[at] = head[at].wrapping_add(1),
-                // What follows stays where it is, and all of it moves.
+                // The bytes that follow keep their order and move.
                 3 if several == 1 => drop(head.drain(at..(at + width).min(end))),
                 4 if several == 1 => drop(head.splice(at..at, vec![noise; width])),
                 _ => head[at..(at + width).min(end)].fill(noise),
@@ -285,7 +285,7 @@ impl Index {
         let values = [0, 1, 2, 3, 7, 8, 59, 61, 1024, 8000, 32_769, 65_536, 65_537, u32::MAX];
         let value = u64::from(values[random.below(values.len())]);
         match random.below(14) {
-            // Places that are written although they are in order, or that no chunk has.
+            // Ids that are written although they are in order, or that no chunk has.
             0 => (self.ranges[a].chunk, self.is_sorted) = (value, false),
             1 => (self.ranges[a].kind, self.is_sorted) = (value.to_le_bytes()[0], false),
             2 => self.ranges[a].length = value,
@@ -333,9 +333,9 @@ impl Index {
         self.put(parts);
     }
 
-    /// Says that the ranges are sorted if they are not, and the other way round, with places as that asks for or as before.
-    pub(crate) fn invert_mark(&mut self, parts: &mut Parts, with_places: bool) {
-        if with_places {
+    /// Says that the ranges are sorted if they are not, and the other way round, with the ids that this asks for or as before.
+    pub(crate) fn invert_mark(&mut self, parts: &mut Parts, with_ids: bool) {
+        if with_ids {
             self.is_sorted = !self.is_sorted;
             self.put(parts);
         } else {

@@ -8,21 +8,21 @@ const SYMBOLS: u32 = 256;
 const COUNT_BITS: usize = 9;
 /// Bits of the first level of a table.
 const FIRST_BITS: u32 = 5;
-/// Degrees of coefficients, and colours, that have odds of their own.
+/// Degrees of coefficients, and colours, that have a bit model of their own.
 const DEGREES: usize = 4;
 const COLOURS: usize = 3;
 
 /// The chance of a bit to be 0, in 4096ths, and how many bits it has seen.
 #[derive(Clone, Copy)]
-struct Odds(u32, usize);
+struct BitModel(u32, usize);
 
-impl Default for Odds {
+impl Default for BitModel {
     fn default() -> Self {
         Self(2048, 0)
     }
 }
 
-/// Writes bits with odds: two words of state, and the words that the states before put down.
+/// Writes adaptive bits: two words of state, and the words that the states before put down.
 struct Writer {
     /// The chance of 0 and the bit, first to last.
     steps: Vec<(u32, bool)>,
@@ -33,12 +33,12 @@ impl Writer {
         Self { steps: Vec::new() }
     }
 
-    fn bit(&mut self, odds: &mut Odds, bit: bool) {
-        self.steps.push((odds.0, bit));
-        let rate = [1, 2, 3, 4, 4, 5][odds.1.min(5)];
-        odds.1 += 1;
-        let zero = if bit { odds.0 - (odds.0 >> rate) } else { odds.0 + ((4096 - odds.0) >> rate) };
-        odds.0 = zero.clamp(48, 4048);
+    fn bit(&mut self, model: &mut BitModel, bit: bool) {
+        self.steps.push((model.0, bit));
+        let rate = [1, 2, 3, 4, 4, 5][model.1.min(5)];
+        model.1 += 1;
+        let zero = if bit { model.0 - (model.0 >> rate) } else { model.0 + ((4096 - model.0) >> rate) };
+        model.0 = zero.clamp(48, 4048);
     }
 
     fn zeros(&mut self, count: u32) {
@@ -64,10 +64,10 @@ impl Writer {
 /// A table for every context of every set, each of the most symbols, of which the last alone occurs.
 pub(crate) fn all_tables() -> Vec<u8> {
     let mut out = Writer::new();
-    let (mut used, mut same) = ([Odds::default(); 2], [Odds::default(); 2]);
-    let (mut many, mut new, mut nonzero) = (Odds::default(), Odds::default(), Odds::default());
-    let mut counts = [Odds::default(); COUNT_BITS];
-    let mut present = [Odds::default(); 2];
+    let (mut used, mut same) = ([BitModel::default(); 2], [BitModel::default(); 2]);
+    let (mut many, mut new, mut nonzero) = (BitModel::default(), BitModel::default(), BitModel::default());
+    let mut counts = [BitModel::default(); COUNT_BITS];
+    let mut present = [BitModel::default(); 2];
     for set in 0..SETS {
         out.bit(&mut used[usize::from(set > 0)], true);
         out.bit(&mut many, true);
@@ -76,8 +76,8 @@ pub(crate) fn all_tables() -> Vec<u8> {
             out.bit(&mut new, true);
         }
         for _ in 0..CONTEXTS {
-            for (length, odds) in (1..=COUNT_BITS).zip(&mut counts) {
-                out.bit(odds, length < COUNT_BITS);
+            for (length, model) in (1..=COUNT_BITS).zip(&mut counts) {
+                out.bit(model, length < COUNT_BITS);
             }
             out.zeros(SYMBOLS.trailing_zeros());
             for symbol in 0..SYMBOLS {
@@ -97,9 +97,9 @@ pub(crate) fn all_tables() -> Vec<u8> {
 /// Learned atoms of degree 4, all of zeros.
 pub(crate) fn atoms(count: usize) -> Vec<u8> {
     let mut out = Writer::new();
-    let mut odds = [[Odds::default(); COLOURS]; DEGREES];
+    let mut models = [[BitModel::default(); COLOURS]; DEGREES];
     for k in (0..count).flat_map(|_| 0..24_usize) {
-        odds[((k + 1).isqrt() - 1).min(DEGREES - 1)].iter_mut().for_each(|odds| out.bit(odds, false));
+        models[((k + 1).isqrt() - 1).min(DEGREES - 1)].iter_mut().for_each(|model| out.bit(model, false));
     }
     out.finish()
 }

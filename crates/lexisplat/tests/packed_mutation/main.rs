@@ -25,7 +25,7 @@ const ALLOWED_PER_BYTE: usize = 542;
 /// grows, and 256 symbols of 16 bytes. A table may take 2 bytes of a file. The dictionary is read when the list has
 /// grown, and takes less than that had taken. [`a_head_takes_its_bytes`] has all of them.
 const ALLOWED_HEAD: usize = (58 * 24 * (4 << 10) + 3 * 24 * (16 << 10)) * 2 + 61 * 24 * (256 * 16 + 64);
-/// What is rounded up, and the container of a short file.
+/// Bytes for rounding up, and for the container of a short file.
 const ALLOWED_BASE: usize = 64 << 10;
 /// Of each thread the 64 Gaussians of 72 values of 16 lanes after which a chunk is asked whether it has bits left, as codes
 /// or rows, lists growing.
@@ -183,19 +183,19 @@ fn numbers_have_one_form() {
     }
 }
 
-/// An index that says that its ranges are sorted though they are not, or the other way round. The places of sorted ranges
+/// An index that says that its ranges are sorted though they are not, or the other way round. The ids of sorted ranges
 /// may be listed too.
 #[test]
 fn the_mark_of_sorted_ranges_is_checked() {
     let _alone = alone();
     for (name, bytes) in files().into_iter().chain([("layered", layered())]) {
-        for with_places in [false, true] {
+        for with_ids in [false, true] {
             let mut parts = Parts::of(&bytes);
             let mut index = Index::of(&mut parts);
-            let lists_all = index.is_sorted && with_places;
-            index.invert_mark(&mut parts, with_places);
+            let lists_all = index.is_sorted && with_ids;
+            index.invert_mark(&mut parts, with_ids);
             Index::seal(&mut parts);
-            assert_eq!(accepted(&parts.sealed()), lists_all, "{name}, {with_places}");
+            assert_eq!(accepted(&parts.sealed()), lists_all, "{name}, {with_ids}");
         }
     }
 }

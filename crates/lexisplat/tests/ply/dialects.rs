@@ -154,7 +154,7 @@ fn far_doubles_stay_where_they_are() {
         parts.read(1500..1600, &mut part).unwrap();
         assert_eq!(part.geometry.positions, found.splats.geometry.positions[1500..1600]);
         assert_eq!(*parts.whole().unwrap(), found.splats);
-        // What is written has doubles again.
+        // The written file has doubles again.
         let mut written = Vec::new();
         ply::write(&mut written, &found.splats).unwrap();
         let again = ply::read_bytes("w.ply", &written, &ReadOptions::default()).unwrap();

@@ -95,7 +95,7 @@ fn naive(bytes: &[u8]) -> Table {
     (properties, rows)
 }
 
-/// What the fast reader should make of `bytes`, if it decides on `offset`.
+/// Returns the scene that the fast reader should make of `bytes`, if it decides on `offset`.
 #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
 fn expected(bytes: &[u8], offset: Option<Offset>) -> Splats {
     let (properties, rows) = naive(bytes);

@@ -31,7 +31,7 @@ pub(super) fn pixels_per_degree() -> f64 {
 }
 
 /// Weights of the blur of each channel along one axis. All have the same odd length. The 2-D weights of Y and Cx are
-/// products of the weights down and across. Those of Cz are the sum of two such products.
+/// products of the weights down and across. The 2-D weights of Cz are the sum of two such products.
 pub(super) struct Blur {
     pub(super) y: Vec<f64>,
     pub(super) cx: Vec<f64>,

@@ -96,7 +96,7 @@ fn agrees_with_the_definition() {
     }
 }
 
-/// What `flip-evaluator` 1.7 says; `benches/metrics_beside_references.py --golden` prints it.
+/// The result of `flip-evaluator` 1.7; `benches/metrics_beside_references.py --golden` prints it.
 const GOLDEN: f64 = 0.149_842;
 
 #[test]

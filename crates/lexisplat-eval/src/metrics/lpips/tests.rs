@@ -4,7 +4,7 @@ use super::testing::random;
 use super::*;
 use crate::metrics::testing::{golden, picture};
 
-/// What package `lpips` 0.1.4 says of the pictures of [`golden`] in `f64`, in both ranges, with weights of
+/// The results of package `lpips` 0.1.4 for the pictures of [`golden`] in `f64`, in both ranges, with weights of
 /// `scripts/lpips_weights.py --random 1`; `benches/metrics_beside_references.py --golden` prints them.
 const GOLDEN: [(Network, [f64; 2]); 2] =
     [(Network::Vgg, [0.116_218_292, 0.040_702_511]), (Network::Alex, [0.167_361_122, 0.068_707_894])];

@@ -4,7 +4,7 @@ use lexisplat::sh::rest_basis;
 use lexisplat::{ShDegree, Splats};
 use serde_json::json;
 
-use super::super::place::GLTF;
+use super::super::placement::GLTF;
 use super::super::write::{unit, write};
 use super::build::Builder;
 use super::{most, opened, read, sample};

@@ -1,4 +1,4 @@
-//! What is written is read.
+//! Written files are read back.
 
 use lexisplat::{Error, ShDegree};
 

@@ -40,10 +40,10 @@ struct Chunk {
     // First block of GROUP Gaussians of the chunk, and number of blocks.
     first_block: u32,
     blocks: u32,
-    // Place in `columns` where the numbers of the escaped Gaussians begin, and number of escaped Gaussians.
+    // Offset in `columns` where the numbers of the escaped Gaussians begin, and number of escaped Gaussians.
     escapes_at: u32,
     escapes: u32,
-    // Place in `nonzeros` where the exact rows of the escaped Gaussians begin.
+    // Offset in `nonzeros` where the exact rows of the escaped Gaussians begin.
     exact_at: u32,
     padding: u32,
 }

@@ -4,7 +4,7 @@
 @group(0) @binding(1) var<storage, read> counters: array<u32>;
 // Slots in the order of depth.
 @group(0) @binding(2) var<storage, read> order: array<u32>;
-// Place where the entries of each splat begin.
+// Index where the entries of each splat begin.
 @group(0) @binding(3) var<storage, read> offsets: array<u32>;
 @group(0) @binding(4) var<storage, read> moments: array<f32>;
 // Sums of moments of each slot.

@@ -1,8 +1,8 @@
 // Sums for each splat of a tile how the tile's pixels change with the splat, like `cpu::moments`. Each workgroup has one
 // tile. While drawing, each lane has one pixel. While summing, several lanes share the pixels of one splat.
 //
-// Place of each entry in the lists, where its moments are stored.
-@group(0) @binding(7) var<storage, read> entry_places: array<u32>;
+// Index of each entry in the lists, where its moments are stored.
+@group(0) @binding(7) var<storage, read> entry_indices: array<u32>;
 // The finished picture over black.
 @group(0) @binding(8) var<storage, read> pixels: array<vec4<f32>>;
 // Moments of each entry. They begin as zeros, and stay zeros for splats that do not show.
@@ -15,12 +15,12 @@ const SHARERS: u32 = GROUP / MOMENT_SPLATS;
 const SHARE: u32 = GROUP / SHARERS;
 
 // A batch of splats. The arrays have: the centre and the conic's xx and xy; the conic's yy, the opacity, red and green;
-// blue; the last diagonal element of the conic's root; the place in the lists.
+// blue; the last diagonal element of the conic's root; the index in the lists.
 var<workgroup> batch_centre: array<vec4<f32>, MOMENT_BATCH>;
 var<workgroup> batch_conic: array<vec4<f32>, MOMENT_BATCH>;
 var<workgroup> batch_blue: array<f32, MOMENT_BATCH>;
 var<workgroup> batch_root: array<f32, MOMENT_BATCH>;
-var<workgroup> batch_place: array<u32, MOMENT_BATCH>;
+var<workgroup> batch_index: array<u32, MOMENT_BATCH>;
 // First the values of every pixel for some splats, then the moments that every lane has summed.
 var<workgroup> scratch: array<f32, PARTS * MOMENT_SPLATS * GROUP>;
 // One bit for each of these splats, which is set if the splat shows.
@@ -95,7 +95,7 @@ fn tile_moments(
             batch_root[lane] = sqrt(splat.conic.y / splat.centre.z);
             batch_conic[lane] = vec4<f32>(splat.conic.xz, splat.colour.xy);
             batch_blue[lane] = splat.colour.z;
-            batch_place[lane] = entry_places[first + lane];
+            batch_index[lane] = entry_indices[first + lane];
         }
         workgroupBarrier();
         let count = min(MOMENT_BATCH, entries.y - first);
@@ -165,11 +165,11 @@ fn tile_moments(
                 let which = lane % MOMENTS;
                 var sum = 0.0;
                 for (var p = 0u; p < SHARERS; p++) {
-                    // Lanes begin at different places, so that they read from different memory banks.
+                    // Lanes begin at different indices, so that they read from different memory banks.
                     let value = scratch[which * GROUP + summed * SHARERS + (p + lane) % SHARERS];
                     sum = select(sum + value, max(sum, value), which == MOMENT_SUMS);
                 }
-                moments[batch_place[k + summed] * MOMENTS + which] = sum;
+                moments[batch_index[k + summed] * MOMENTS + which] = sum;
             }
             workgroupBarrier();
         }

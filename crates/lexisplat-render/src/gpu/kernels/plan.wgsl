@@ -6,7 +6,7 @@
 @group(0) @binding(2) var<storage, read> chunk_blocks: array<u32>;
 @group(0) @binding(3) var<storage, read_write> counters: array<u32>;
 @group(0) @binding(4) var<storage, read_write> dispatches: array<u32>;
-// Place where the entries of each slot begin in the tile lists. Only `plan_entries` reads it.
+// Index where the entries of each slot begin in the tile lists. Only `plan_entries` reads it.
 @group(0) @binding(5) var<storage, read> offsets: array<u32>;
 
 fn dispatch_groups(which: u32, n: u32) {

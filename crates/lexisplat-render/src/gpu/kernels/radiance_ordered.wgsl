@@ -20,7 +20,7 @@ fn radiance(
         atomicStore(&bins[lane], 0u);
     }
     workgroupBarrier();
-    let place = atomicAdd(&bins[count], 1u);
+    let rank = atomicAdd(&bins[count], 1u);
     workgroupBarrier();
     if lane < COUNT_BINS {
         bin_ends[lane] = atomicLoad(&bins[lane]);
@@ -37,7 +37,7 @@ fn radiance(
         }
         workgroupBarrier();
     }
-    ordered[bin_ends[count] - atomicLoad(&bins[count]) + place] = lane;
+    ordered[bin_ends[count] - atomicLoad(&bins[count]) + rank] = lane;
     workgroupBarrier();
     colour_slot(slot_of(number, ordered[lane]));
 }

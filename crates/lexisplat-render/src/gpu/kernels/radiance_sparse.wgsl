@@ -29,7 +29,7 @@ fn sum_of_bytes(word: u32) -> u32 {
 
 fn column_of(i: u32) -> Column {
     let base = (i / COLUMN_GROUP) * COLUMN_WORDS;
-    let place = i % COLUMN_GROUP;
+    let index = i % COLUMN_GROUP;
     var before = 0u;
     var all = 0u;
     var own = 0u;
@@ -37,11 +37,11 @@ fn column_of(i: u32) -> Column {
         let word = columns[base + 1u + w];
         let counts = word & 0x7f7f7f7fu;
         all += sum_of_bytes(counts);
-        if w < place / 4u {
+        if w < index / 4u {
             before += sum_of_bytes(counts);
         }
-        if w == place / 4u {
-            let shift = 8u * (place % 4u);
+        if w == index / 4u {
+            let shift = 8u * (index % 4u);
             before += sum_of_bytes(counts & ((1u << shift) - 1u));
             own = (word >> shift) & 0xffu;
         }

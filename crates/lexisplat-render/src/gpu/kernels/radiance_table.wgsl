@@ -3,7 +3,7 @@
 @group(0) @binding(10) var table: texture_2d_array<f32>;
 @group(0) @binding(11) var linear: sampler;
 
-// Returns the place of direction `d` in the table. The centres of the outer texels lie on the edges of a face, so that no
+// Returns the texture coordinates of direction `d` in the table. The centres of the outer texels lie on the edges of a face, so that no
 // sample mixes two faces.
 fn look(d: vec3<f32>) -> vec2<f32> {
     let size = abs(d);
@@ -25,6 +25,6 @@ fn look(d: vec3<f32>) -> vec2<f32> {
     return vec2<f32>((f32(face) * side + texel.x) / (6.0 * side), texel.y / side);
 }
 
-fn atom_seen(atom: u32, place: vec2<f32>) -> vec3<f32> {
-    return textureSampleLevel(table, linear, place, atom, 0.0).xyz;
+fn atom_seen(atom: u32, uv: vec2<f32>) -> vec3<f32> {
+    return textureSampleLevel(table, linear, uv, atom, 0.0).xyz;
 }

@@ -5,7 +5,7 @@ struct Pass {
     // Indices of the counters with the number of pairs and the number of blocks.
     length: u32,
     blocks: u32,
-    // 1 if the values are the places of their keys, as in the first pass of a sort of slots; otherwise 0.
+    // 1 if the values are the indices of their keys, as in the first pass of a sort of slots; otherwise 0.
     identity: u32,
 }
 
@@ -111,14 +111,14 @@ fn sort_scatter(
             let digit = digit_of(own[k]);
             let tally = (digit / 2u) * GROUP + lane;
             let half = 16u * (digit % 2u);
-            let place = bases[digit] + ((tallies[tally] >> half) & 0xffffu);
+            let to = bases[digit] + ((tallies[tally] >> half) & 0xffffu);
             tallies[tally] += 1u << half;
-            keys_out[place] = own[k];
+            keys_out[to] = own[k];
             var value = i;
             if digit_pass.identity == 0u {
                 value = values[i];
             }
-            values_out[place] = value;
+            values_out[to] = value;
         }
     }
 }

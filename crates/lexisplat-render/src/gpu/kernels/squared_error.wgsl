@@ -10,7 +10,7 @@
 struct Extent {
     // Number of pixels that are compared.
     pixels: u32,
-    // Place where the first workgroup stores its sum.
+    // Index where the first workgroup stores its sum.
     first_sum: u32,
     padding_a: u32,
     padding_b: u32,

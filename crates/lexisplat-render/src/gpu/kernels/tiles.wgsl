@@ -7,7 +7,7 @@
 @group(0) @binding(4) var<storage, read> rects: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read> centres: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read> conics: array<vec4<f32>>;
-// First the number of tiles that each splat touches; after the scan the place where its entries begin.
+// First the number of tiles that each splat touches; after the scan the index where its entries begin.
 @group(0) @binding(7) var<storage, read_write> offsets: array<u32>;
 
 // Returns the rows of the band that `rect` covers: the first row, and the first row after the last.

@@ -134,7 +134,7 @@ fn scenes_in_turn_are_drawn_without_trying_again() {
         assert_eq!(stats.retries, 0);
         assert!(bits(&again) == bits(picture));
     }
-    // What was kept for a scene goes with it.
+    // The buffers kept for a scene go with it.
     let [one, other] = scenes;
     assert!(renderer.plans.iter().any(|plan| plan.scene == one.id));
     let gone = one.id;

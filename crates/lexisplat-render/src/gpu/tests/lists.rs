@@ -42,7 +42,7 @@ fn check(view: &View, scene: &Scene<'_>, camera: &Camera) -> [usize; 3] {
     let ranges: Vec<[u32; 2]> = view.gpu.read_back(&view.work().ranges);
     let mut lists: Vec<Vec<u32>> = vec![Vec::new(); tiles];
     for &(tile, slot) in &entries {
-        // What belongs to no tile comes last.
+        // Entries of no tile come last.
         if (tile as usize) < tiles {
             lists[tile as usize].push(slot);
         }
@@ -56,8 +56,8 @@ fn check(view: &View, scene: &Scene<'_>, camera: &Camera) -> [usize; 3] {
 
     // Each is in order of depth and holds no splat twice.
     let mut rank = vec![0; gaussians.len()];
-    for (place, slot) in view.order().into_iter().enumerate() {
-        rank[slot as usize] = place;
+    for (position, slot) in view.order().into_iter().enumerate() {
+        rank[slot as usize] = position;
     }
     let (mut listed, mut needed, mut outside) = (0, 0, 0);
     for (tile, list) in lists.iter().enumerate() {

@@ -65,9 +65,9 @@ fn ellipses_are_the_processors() {
             let at_level = opacity * (-0.5 * level).exp();
             assert!((0.999..=1.0).contains(&(at_level * 255.0)), "level {level}, {twin:?}");
             // Nearest first, ties in order of index: by the GPU's own depths, which are about the twin's.
-            let place = (twin.depth, gaussians[s]);
-            assert!(place.0 + DEPTH_ERROR >= last.0, "{twin:?} comes after {last:?}");
-            last = place;
+            let key = (twin.depth, gaussians[s]);
+            assert!(key.0 + DEPTH_ERROR >= last.0, "{twin:?} comes after {last:?}");
+            last = key;
             assert!(twin.depth >= camera.near.to_bits());
             compared += 1;
         }
@@ -89,12 +89,12 @@ fn equal_depths_keep_the_order_of_index() {
     let view = View::new(&gpu, &scene, &camera, &RenderOptions::default());
     let rects: Vec<[u32; 2]> = gpu.read_back(&view.work().rects);
     let gaussians = view.gaussians();
-    let places: Vec<(u32, u32)> = view
+    let keys: Vec<(u32, u32)> = view
         .order()
         .into_iter()
         .filter(|&slot| rects[slot as usize] != [0, 0])
         .map(|slot| gaussians[slot as usize])
         .map(|g| (g % 5, g))
         .collect();
-    assert!(places.len() > 1000 && places.is_sorted());
+    assert!(keys.len() > 1000 && keys.is_sorted());
 }

@@ -91,7 +91,7 @@ fn more_blocks_than_one_dimension_has_get_slots() {
     let blocks = MAX_GROUPS + 300;
     let bench = Bench::new(&gpu, blocks);
     let words = GROUP / u32::BITS;
-    // One Gaussian in most blocks, at a place that varies.
+    // One Gaussian in most blocks, at an index that varies.
     let marked: Vec<u32> = (0..blocks).filter(|b| b % 7 != 3).map(|b| b * GROUP + b * 31 % GROUP).collect();
     let mut masks = vec![0_u32; (blocks * words) as usize];
     let mut starts = vec![0_u32; blocks as usize];
@@ -130,7 +130,7 @@ fn scans_are_exclusive_sums() {
             if fixed {
                 planner.scan(&bench.work.offsets, Counter::Found, Some(length), None).unwrap();
             } else {
-                // That scan is over one more than there are slots.
+                // The scan is over one more than there are slots.
                 bench.count(&mut planner, length - 1);
                 planner
                     .scan(&bench.work.offsets, Counter::SlotsAndEnd, None, Some(Dispatch::SlotScan))
@@ -143,7 +143,7 @@ fn scans_are_exclusive_sums() {
                 sum += std::mem::replace(number, sum);
             }
             let found: Vec<u32> = bench.gpu.read_back(&bench.work.offsets);
-            // What lies beyond the length stays as it is.
+            // Values beyond the length stay as they are.
             assert_eq!(found[..expected.len()], expected, "length {length}, fixed {fixed}");
         }
     }

@@ -12,7 +12,7 @@ use super::super::shaders::{DRAWING, MEASURING};
 use super::made;
 use crate::scene::Scene;
 
-/// What plain WebGPU can; halves there are in packed pairs only.
+/// Capabilities of plain WebGPU; halves there are in packed pairs only.
 const PLAIN: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
 /// WebGPU's `maxStorageBuffersPerShaderStage`.
 const MOST_BUFFERS: usize = 8;

@@ -119,7 +119,7 @@ impl<'a> Checked<'a> {
             _ => (checked.values::<u32>(tensor::HEADER_CHECKSUM, Dtype::U32, &[1])?, header_checksum),
         };
         if stored != [expected] {
-            return Err(format(FormatError::Checksum { part: "header".to_owned() }));
+            return Err(format(FormatError::Checksum { covered: "header".to_owned() }));
         }
         checked.verify_tensors()?;
         Ok(checked)
@@ -160,7 +160,7 @@ impl<'a> Checked<'a> {
         });
         for (name, sum) in names.iter().zip(found) {
             if sum.ok().as_deref() != Some(listed(name)) {
-                return Err(Error::format(&self.file, FormatError::Checksum { part: (*name).to_owned() }));
+                return Err(Error::format(&self.file, FormatError::Checksum { covered: (*name).to_owned() }));
             }
         }
         Ok(())
@@ -196,9 +196,9 @@ impl<'a> Checked<'a> {
     /// there.
     pub(super) fn first_of(&self, name: &str) -> Option<(u64, u64, &[u8])> {
         let Range { start, end } = self.header.info(name)?.data_offsets;
-        let place = |offset: usize| self.data_start.saturating_add(offset);
-        let there = |offset: usize| place(offset).min(self.bytes().len());
-        Some((place(start) as u64, (end - start) as u64, self.bytes().get(there(start)..there(end))?))
+        let at = |offset: usize| self.data_start.saturating_add(offset);
+        let there = |offset: usize| at(offset).min(self.bytes().len());
+        Some((at(start) as u64, (end - start) as u64, self.bytes().get(there(start)..there(end))?))
     }
 
     pub(super) fn has(&self, name: &str) -> bool {
@@ -260,8 +260,8 @@ impl<'a> Checked<'a> {
     }
 
     /// Returns the names of all tensors, in the order in which the tensors lie.
-    pub(super) fn names_by_place(&self) -> Vec<&str> {
-        self.header.by_place().into_iter().map(|(name, _)| name.as_str()).collect()
+    pub(super) fn names_by_offset(&self) -> Vec<&str> {
+        self.header.by_offset().into_iter().map(|(name, _)| name.as_str()).collect()
     }
 
     /// Returns all bytes of the file that are there.

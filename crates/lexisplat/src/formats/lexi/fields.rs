@@ -139,7 +139,7 @@ pub(super) fn check_extra_names(checked: &Checked<'_>) -> Result<()> {
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     check_extra_names(checked)?;
     let mut out = Vec::new();
-    let names = if checked.is_packed() { checked.names_by_place() } else { checked.names().collect() };
+    let names = if checked.is_packed() { checked.names_by_offset() } else { checked.names().collect() };
     for full in names {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
         if !checked.is_whole() {

@@ -75,7 +75,7 @@ impl Header {
     /// Refuses tensors that do not lie one after another, or do not have the length of their shape.
     fn check(&self) -> Result<(), String> {
         let mut last = 0;
-        for (name, tensor) in self.by_place() {
+        for (name, tensor) in self.by_offset() {
             let Range { start, end } = tensor.data_offsets;
             if start != last || end < start {
                 return Err(invalid(&format!("invalid offset for tensor `{name}`")));
@@ -96,8 +96,8 @@ impl Header {
     }
 
     pub(super) fn info(&self, name: &str) -> Option<&TensorInfo> {
-        let place = self.tensors.binary_search_by(|tensor| tensor.0.as_str().cmp(name)).ok()?;
-        self.tensors.get(place).map(|tensor| &tensor.1)
+        let index = self.tensors.binary_search_by(|tensor| tensor.0.as_str().cmp(name)).ok()?;
+        self.tensors.get(index).map(|tensor| &tensor.1)
     }
 
     /// Returns the names of all tensors, sorted.
@@ -106,12 +106,12 @@ impl Header {
     }
 
     /// Returns all tensors in the order in which they lie.
-    pub(super) fn by_place(&self) -> Vec<&(String, TensorInfo)> {
+    pub(super) fn by_offset(&self) -> Vec<&(String, TensorInfo)> {
         let start = |k: usize| {
             self.tensors.get(k).map(|(_, tensor)| (tensor.data_offsets.start, tensor.data_offsets.end))
         };
-        let places = order(self.tensors.len(), &mut |a, b| start(a).cmp(&start(b)));
-        places.into_iter().filter_map(|k| self.tensors.get(k)).collect()
+        let sorted = order(self.tensors.len(), &mut |a, b| start(a).cmp(&start(b)));
+        sorted.into_iter().filter_map(|k| self.tensors.get(k)).collect()
     }
 
     /// Returns the metadata entry `key`.
@@ -128,12 +128,12 @@ fn invalid(what: &str) -> String {
 fn tensor(value: &Json) -> Result<TensorInfo, &'static str> {
     let dtype = value.get("dtype").and_then(Json::text).ok_or("is not described")?;
     let (_, dtype) = *DTYPES.iter().find(|(name, _)| *name == dtype).ok_or("has an unknown dtype")?;
-    let place = || {
+    let tensor = || {
         let shape = value.get("shape")?.items()?.iter().map(Json::number).collect::<Option<_>>()?;
         let [start, end] = value.get("data_offsets")?.items()? else { return None };
         Some(TensorInfo { dtype, shape, data_offsets: start.number()?..end.number()? })
     };
-    place().ok_or("is not described")
+    tensor().ok_or("is not described")
 }
 
 #[cfg(test)]

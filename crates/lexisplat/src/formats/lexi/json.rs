@@ -36,8 +36,8 @@ impl Json {
     /// Returns the member `name` of an object, if there is one.
     pub(super) fn get(&self, name: &str) -> Option<&Self> {
         let members = self.members()?;
-        let place = members.binary_search_by(|member| member.0.as_str().cmp(name)).ok()?;
-        members.get(place).map(|member| &member.1)
+        let index = members.binary_search_by(|member| member.0.as_str().cmp(name)).ok()?;
+        members.get(index).map(|member| &member.1)
     }
 
     /// Returns the members of an object, sorted by their names; `None` for other values.
@@ -223,8 +223,8 @@ impl Parser<'_> {
             members.push((name, self.value(depth)?));
             goes_on = self.goes_on(b'}')?;
         }
-        let places = order(members.len(), &mut |a, b| members[a].0.cmp(&members[b].0));
-        let members: Vec<_> = places.into_iter().map(|k| std::mem::take(&mut members[k])).collect();
+        let sorted = order(members.len(), &mut |a, b| members[a].0.cmp(&members[b].0));
+        let members: Vec<_> = sorted.into_iter().map(|k| std::mem::take(&mut members[k])).collect();
         match members.array_windows().find(|[a, b]| a.0 == b.0) {
             Some([twice, _]) => Err(format!("member '{}' is there twice", twice.0.escape_debug())),
             None => Ok(Json::Object(members)),

@@ -46,7 +46,7 @@ pub(super) fn data<'a>(checked: &'a Checked<'_>) -> Result<&'a [u8]> {
 }
 
 /// Returns the position at which the data of a packed file start, and their length.
-pub(super) fn data_place(checked: &Checked<'_>) -> (u64, u64) {
+pub(super) fn data_span(checked: &Checked<'_>) -> (u64, u64) {
     checked.first_of(tensor::DATA).map(|(start, length, _)| (start, length)).unwrap_or_default()
 }
 
@@ -139,7 +139,7 @@ pub(super) fn check_columns(checked: &Checked<'_>, n: usize) -> Result<()> {
     extras(checked, n, &(0..0)).map(drop)
 }
 
-/// Returns the places in the source of the Gaussians of `range`. The file has `n` Gaussians.
+/// Returns the indices in the source of the Gaussians of `range`. The file has `n` Gaussians.
 pub(super) fn order(checked: &Checked<'_>, n: usize, range: Range<usize>) -> Result<Vec<u32>> {
     if !checked.is_whole() {
         return Err(checked.malformed("only a first part is there, without the order of the source"));
@@ -152,18 +152,18 @@ pub(super) fn order(checked: &Checked<'_>, n: usize, range: Range<usize>) -> Res
     }
 }
 
-/// Number of Gaussians whose places are looked at together.
-const PLACES_AT_ONCE: usize = 1 << 16;
+/// Number of Gaussians whose indices are looked at together.
+const INDICES_AT_ONCE: usize = 1 << 16;
 
 /// Returns whether the order names each of `n` Gaussians once.
 fn is_permutation(checked: &Checked<'_>, n: usize) -> Result<bool> {
     let mut seen = vec![0_u64; n.div_ceil(64)];
     // The column is looked at once even if it has no values.
-    for first in (0..n.max(1)).step_by(PLACES_AT_ONCE) {
-        for place in order(checked, n, first..n.min(first + PLACES_AT_ONCE))? {
-            let place = place as usize;
-            let Some(word) = seen.get_mut(place / 64).filter(|_| place < n) else { return Ok(false) };
-            let bit = 1 << (place % 64);
+    for first in (0..n.max(1)).step_by(INDICES_AT_ONCE) {
+        for index in order(checked, n, first..n.min(first + INDICES_AT_ONCE))? {
+            let index = index as usize;
+            let Some(word) = seen.get_mut(index / 64).filter(|_| index < n) else { return Ok(false) };
+            let bit = 1 << (index % 64);
             if *word & bit != 0 {
                 return Ok(false);
             }

@@ -118,7 +118,7 @@ impl<'a> LexiReader<'a> {
             let mut head = super::packed::head(&checked, limits)?;
             super::packed::check_columns(&checked, head.gaussians)?;
             let data = super::packed::data(&checked)?;
-            let (start, length) = super::packed::data_place(&checked);
+            let (start, length) = super::packed::data_span(&checked);
             let decoder = Decoder::of_prefix(&head, data.len() as u64, length)?;
             let there = decoder.spans().last().map_or(0, |span| span.end);
             let whole = std::mem::replace(&mut head.gaussians, there);
@@ -264,7 +264,7 @@ impl<'a> LexiReader<'a> {
         &self.tensor_bytes
     }
 
-    /// Returns the places in the source of the Gaussians of `range`, for a packed file that holds the order of its source.
+    /// Returns the indices in the source of the Gaussians of `range`, for a packed file that holds the order of its source.
     ///
     /// # Errors
     /// [`crate::Error::Format`] if the file does not hold the order or the range ends after [`Self::len`].

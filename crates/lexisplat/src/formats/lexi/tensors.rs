@@ -28,12 +28,12 @@ pub(super) struct Tensor<'a> {
     sum: Sum,
 }
 
-/// The place of the checksum of a tensor.
+/// The part of a file that holds the checksum of a tensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sum {
     /// In the metadata.
     Listed,
-    /// At a place that depends on the meaning of the tensor.
+    /// In bytes that depend on the meaning of the tensor.
     Elsewhere,
     /// In the first four bytes of the tensor, which come before the bytes of the source. The checksum covers the
     /// header and the source. The file then has no tensor with the checksum of the header.

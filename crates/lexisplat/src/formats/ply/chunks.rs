@@ -99,8 +99,8 @@ impl<'a> PlySource<'a> {
         }
         progress.end();
         file.report(&found, options)?;
-        let Found { bad: dropped, normals, places, .. } = found;
-        file.settle(places);
+        let Found { bad: dropped, normals, position_facts, .. } = found;
+        file.settle(position_facts);
         let dropped = DroppedRows::new(dropped);
         Ok((Self { file, dropped, normals, whole: Mutex::default() }, splats))
     }

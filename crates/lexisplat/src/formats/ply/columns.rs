@@ -18,7 +18,7 @@ pub(super) struct Packed<'a> {
     pub(super) big: bool,
 }
 
-/// The place of a property in a row.
+/// The bytes of a property in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Field {
     /// Its first byte.
@@ -119,8 +119,8 @@ fn copy_run<T: Scalar, const BIG: bool>(rows: Packed<'_>, run: Run, out: &mut [f
 
 /// Fills `out` with the values at `offset` of each row, in their own type.
 pub(super) fn read_column<T: Scalar>(rows: Packed<'_>, offset: usize, out: &mut [T]) {
-    let place = offset..offset + T::BYTES;
-    let values = rows.bytes.chunks_exact(rows.row_bytes).map(|row| &row[place.clone()]);
+    let span = offset..offset + T::BYTES;
+    let values = rows.bytes.chunks_exact(rows.row_bytes).map(|row| &row[span.clone()]);
     if rows.big {
         out.iter_mut().zip(values).for_each(|(out, bytes)| *out = T::load::<true>(bytes));
     } else {

@@ -6,7 +6,7 @@ use super::layout::{Layout, POSITIONS};
 use super::marks::marks;
 use super::names::NORMAL;
 use super::options::ReadOptions;
-use super::places::Places;
+use super::position_facts::PositionFacts;
 use super::rows::Rows;
 use super::summary::PlySummary;
 use crate::formats::kind::without_byte_order_mark;
@@ -71,9 +71,9 @@ impl<'a> PlyFile<'a> {
     }
 
     /// Decides on an offset, after all rows were read.
-    pub(super) fn settle(&mut self, places: Places) {
+    pub(super) fn settle(&mut self, position_facts: PositionFacts) {
         if std::mem::take(&mut self.looks_at_positions) {
-            let settled = places.settle();
+            let settled = position_facts.settle();
             self.meta.offset = settled.offset;
             self.warnings.extend(settled.warnings);
         }

@@ -7,7 +7,7 @@ use super::file::PlyFile;
 use super::found::Found;
 use super::layout::{GROUPS, Layout, NORMALS, OPACITIES, POSITIONS, REST, SCALES, rest_name};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE};
-use super::places::Places;
+use super::position_facts::PositionFacts;
 use crate::scene::extra::{Extra, for_extra, with_scalar};
 use crate::scene::offset::single;
 use crate::scene::rounding;
@@ -162,7 +162,8 @@ impl PlyFile<'_> {
             let mut exact = vec![0.0; floats[POSITIONS].len()];
             self.layout.groups[POSITIONS].read_exact(packed, &mut exact);
             let stride = rounding::sample(self.count);
-            found.places = Places::of(rows.clone(), stride, &found.bad, &exact, floats[SCALES]);
+            found.position_facts =
+                PositionFacts::of(rows.clone(), stride, &found.bad, &exact, floats[SCALES]);
         }
         // A negative zero counts as a normal, because a value must keep all its bits.
         let any_bits = |values: &[f32]| values.iter().fold(0, |any, v| any | v.to_bits()) != 0;

@@ -1,6 +1,6 @@
 //! Facts about the values of a PLY.
 
-use super::places::Places;
+use super::position_facts::PositionFacts;
 
 /// The facts that `PlyFile::fill` finds.
 #[derive(Debug, Default)]
@@ -14,7 +14,7 @@ pub(super) struct Found {
     /// Number of infinite opacities.
     pub(super) sure: usize,
     /// Facts about positions that are finer than f32, until the offset is decided.
-    pub(super) places: Places,
+    pub(super) position_facts: PositionFacts,
     /// Number of Gaussians with a scale of minus infinity.
     pub(super) flat: usize,
 }
@@ -26,7 +26,7 @@ impl Found {
         self.bad_property = self.bad_property.take().or(next.bad_property);
         self.normals |= next.normals;
         self.sure += next.sure;
-        self.places.add(next.places);
+        self.position_facts.add(next.position_facts);
         self.flat += next.flat;
     }
 }

@@ -1,4 +1,4 @@
-//! The place of each property in a row, and the refusal of PLY files that are no 3DGS scenes.
+//! The offset of each property in a row, and the refusal of PLY files that are no 3DGS scenes.
 
 use std::collections::HashMap;
 
@@ -22,7 +22,7 @@ pub(super) const SCALES: usize = 5;
 /// A fact of a header, or the reason of a refusal.
 type Accepted<T> = Result<T, FormatError>;
 
-/// The place of each property in a vertex row.
+/// The offset of each property in a vertex row.
 #[derive(Debug)]
 pub(super) struct Layout {
     /// The index of the vertex element in the header.

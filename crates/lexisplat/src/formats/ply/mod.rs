@@ -51,7 +51,7 @@ mod layout;
 mod marks;
 mod names;
 mod options;
-mod places;
+mod position_facts;
 mod read;
 mod rows;
 mod scalar;

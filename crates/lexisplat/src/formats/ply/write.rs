@@ -176,8 +176,8 @@ impl RowLayout {
             for (row, position) in
                 rows.chunks_exact_mut(self.row_bytes).zip(&geometry.positions[range.clone()])
             {
-                let places = row.chunks_exact_mut(size_of::<f64>()).zip(position.iter().zip(by.get()));
-                places.for_each(|(to, (v, by))| to.copy_from_slice(&(f64::from(*v) + by).to_le_bytes()));
+                let coordinates = row.chunks_exact_mut(size_of::<f64>()).zip(position.iter().zip(by.get()));
+                coordinates.for_each(|(to, (v, by))| to.copy_from_slice(&(f64::from(*v) + by).to_le_bytes()));
             }
             (groups[0].1, offset) = (0, POSITION.len() * size_of::<f64>());
         }

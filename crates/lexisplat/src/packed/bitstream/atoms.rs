@@ -53,7 +53,7 @@ impl WholeAtoms {
     /// Codes the numbers of `learned` atoms. A decoder passes no numbers. The result has the decoded numbers.
     fn code(&self, coder: &mut dyn Bits, learned: usize) -> Self {
         let per_channel = self.degree.rest_per_channel();
-        let mut odds = [[[SignedBitModel::default(); SIZES]; CHANNELS]; DEGREES];
+        let mut models = [[[SignedBitModel::default(); SIZES]; CHANNELS]; DEGREES];
         let mut numbers: Vec<i32> = Vec::with_capacity(self.numbers.len());
         for _ in 0..learned {
             let first = numbers.len();
@@ -69,8 +69,8 @@ impl WholeAtoms {
                     let around =
                         size(CHANNELS) + if colour > 0 { size(colour) / 2 } else { size(2 * CHANNELS) };
                     let around = ((u32::BITS - around.leading_zeros()) as usize).min(SIZES - 1);
-                    let odds = &mut odds[of_degree][colour][around];
-                    numbers.push(coder.signed(odds, self.numbers.get(numbers.len()).copied().unwrap_or(0)));
+                    let model = &mut models[of_degree][colour][around];
+                    numbers.push(coder.signed(model, self.numbers.get(numbers.len()).copied().unwrap_or(0)));
                 }
             }
         }

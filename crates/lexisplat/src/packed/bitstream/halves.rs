@@ -8,9 +8,9 @@ const CUT: u32 = f32::MANTISSA_DIGITS - f16::MANTISSA_DIGITS;
 /// the second on.
 const LEAST: u32 = 113 << 23;
 const BEYOND: u32 = 0x477f_f000;
-/// Difference between the exponents of a number in both precisions, at the place of the exponent of an f32.
+/// Difference between the exponents of a number in both precisions, in the bits of the exponent of an f32.
 const REBIAS: u32 = 112 << 23;
-/// The bits of infinity in half precision, shifted to the place of those of an f32.
+/// The bits of infinity in half precision, shifted to those of an f32.
 const INFINITE: u32 = 0x7c00 << CUT;
 const SIGN: u32 = 1 << 31;
 

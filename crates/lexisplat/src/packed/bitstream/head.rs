@@ -19,7 +19,7 @@ use crate::support::limits::MAX_ATOMS;
 
 /// Largest binary logarithm of the unit of base colours.
 const MAX_DC_EXPONENT: u8 = 100;
-/// Number of bits of the number of points of view, and the place of the two flags after the number of SH parts.
+/// Number of bits of the number of points of view, and the position of the two flags after the number of SH parts.
 const POINTS_BITS: u32 = 4;
 const MARKS: u32 = 6;
 /// Number of bits of the binary logarithm of the unit of base colours. The flag of interim changes is the bit above.

@@ -17,7 +17,7 @@ const LEAST_BITS: u64 = 3;
 /// A range of the data of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::packed) struct Range {
-    /// The place in the data where the range starts.
+    /// The offset in the data where the range starts.
     pub(in crate::packed) start: u64,
     pub(in crate::packed) length: u32,
     /// CRC-32 of its bytes.
@@ -27,7 +27,7 @@ pub(in crate::packed) struct Range {
 }
 
 impl Range {
-    /// Returns the place in the data where the range ends.
+    /// Returns the offset in the data where the range ends.
     pub(in crate::packed) fn end(&self) -> u64 {
         self.start.saturating_add(self.length.into())
     }
@@ -52,7 +52,7 @@ pub(in crate::packed) struct Chunk {
 
 /// A range, by the index of its chunk and its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::packed) struct Place {
+pub(in crate::packed) struct RangeId {
     pub(in crate::packed) chunk: u32,
     pub(in crate::packed) kind: u8,
 }
@@ -64,7 +64,7 @@ pub(in crate::packed) struct Index {
     /// All chunks, layer by layer.
     pub(in crate::packed) chunks: Vec<Chunk>,
     /// All ranges in the order of the data.
-    pub(in crate::packed) order: Vec<Place>,
+    pub(in crate::packed) order: Vec<RangeId>,
 }
 
 /// Returns the form of each layer. `refinements` holds the number of refinements of each. All layers but the last have
@@ -83,7 +83,7 @@ impl Index {
     /// Computes the first Gaussian of each chunk and the start of each range. Rounds the bounds of chunks outward to the
     /// two bytes a number that a file holds. `None` if the Gaussians or the bytes are too many to count, or if the order
     /// names a range that is not there.
-    pub(in crate::packed) fn place(&mut self) -> Option<()> {
+    pub(in crate::packed) fn lay_out(&mut self) -> Option<()> {
         let mut first = 0_usize;
         let is_one = self.chunks.len() == 1;
         for chunk in &mut self.chunks {
@@ -92,8 +92,8 @@ impl Index {
             first = first.checked_add(chunk.gaussians)?;
         }
         let mut start = 0_u64;
-        for &place in &self.order {
-            let range = self.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
+        for &id in &self.order {
+            let range = self.chunks.get_mut(id.chunk as usize)?.ranges.get_mut(usize::from(id.kind))?;
             range.start = start;
             start = start.checked_add(range.length.into())?;
         }
@@ -115,12 +115,11 @@ impl Index {
         self.layers.get(layer).copied().unwrap_or_default()
     }
 
-    /// Returns the place in the data where the second layer starts; `None` if there is one layer.
+    /// Returns the offset in the data where the second layer starts; `None` if there is one layer.
     pub(in crate::packed) fn first_layer_end(&self) -> Option<u64> {
-        let second =
-            |place: &&Place| self.chunks.get(place.chunk as usize).is_some_and(|chunk| chunk.layer > 0);
-        let place = self.order.iter().find(second)?;
-        self.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind)).map(|range| range.start)
+        let second = |id: &&RangeId| self.chunks.get(id.chunk as usize).is_some_and(|chunk| chunk.layer > 0);
+        let id = self.order.iter().find(second)?;
+        self.chunks.get(id.chunk as usize)?.ranges.get(usize::from(id.kind)).map(|range| range.start)
     }
 
     /// Returns the cells where the base of the next layer is missing; none if `layer` has no interim changes. `there`
@@ -167,7 +166,7 @@ impl Index {
 
     /// Returns whether the ranges lie chunk by chunk in the order of their kinds.
     fn is_sorted(&self) -> bool {
-        self.order.is_sorted_by_key(|place| (place.chunk, place.kind))
+        self.order.is_sorted_by_key(|id| (id.chunk, id.kind))
     }
 
     pub(in crate::packed) fn write(&self, out: &mut Vec<u8>) {
@@ -183,13 +182,13 @@ impl Index {
                 chunk.bounds.as_flattened().iter().for_each(|&x| put_bf16(out, x));
             }
         }
-        for place in &self.order {
-            let chunk = self.chunks.get(place.chunk as usize);
-            let range = chunk.and_then(|chunk| chunk.ranges.get(usize::from(place.kind)));
+        for id in &self.order {
+            let chunk = self.chunks.get(id.chunk as usize);
+            let range = chunk.and_then(|chunk| chunk.ranges.get(usize::from(id.kind)));
             let Range { length, checksum, integers, .. } = range.copied().unwrap_or_default();
             if !is_sorted {
-                put_number(out, place.chunk.into());
-                out.push(place.kind);
+                put_number(out, id.chunk.into());
+                out.push(id.kind);
             }
             put_number(out, length.into());
             out.extend([checksum, integers].iter().flat_map(|x| x.to_le_bytes()));
@@ -244,12 +243,12 @@ impl Index {
             index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges: blank });
         }
         let mut seen = vec![0_u32; index.chunks.len()];
-        // The place of the next range, for ranges that are sorted.
-        let mut next = Place { chunk: 0, kind: 0 };
+        // The id of the next range, for ranges that are sorted.
+        let mut next = RangeId { chunk: 0, kind: 0 };
         for number in 0..ranges {
-            let place = match is_sorted {
+            let id = match is_sorted {
                 true => next,
-                false => Place {
+                false => RangeId {
                     chunk: from.take("chunk of a range", ByteReader::number32)?,
                     kind: from.take("kind of a range", ByteReader::u8)?,
                 },
@@ -257,7 +256,7 @@ impl Index {
             let length = from.take("bytes of a range", ByteReader::number32)?;
             let checksum = from.take("CRC-32 of a range", ByteReader::u32)?;
             let integers = from.take("CRC-32 of the integers of a range", ByteReader::u32)?;
-            let Place { chunk: c, kind } = place;
+            let RangeId { chunk: c, kind } = id;
             let (chunk, kind) = (c as usize, usize::from(kind));
             let kinds = index.chunks.get(chunk).map_or(0, |chunk| chunk.ranges.len());
             let range = index.chunks.get_mut(chunk).and_then(|chunk| chunk.ranges.get_mut(kind));
@@ -275,10 +274,10 @@ impl Index {
                 format!("range {number} of chunk {chunk} comes before its base")
             })?;
             *seen |= bit;
-            index.order.push(place);
+            index.order.push(id);
             next = match kind + 1 < kinds {
-                true => Place { kind: place.kind + 1, ..place },
-                false => Place { chunk: place.chunk + 1, kind: 0 },
+                true => RangeId { kind: id.kind + 1, ..id },
+                false => RangeId { chunk: id.chunk + 1, kind: 0 },
             };
         }
         for (c, chunk) in index.chunks.iter().enumerate() {
@@ -288,7 +287,7 @@ impl Index {
             })?;
         }
         index
-            .place()
+            .lay_out()
             .ok_or_else(|| BrokenHead("the Gaussians or the bytes are too many to count".to_owned()))?;
         Ok(index)
     }
@@ -320,11 +319,11 @@ mod tests {
             ranges: vec![Range { length: 300 + c as u32, checksum: 7, integers: 8, start: 0 }; 2],
             ..Chunk::default()
         };
-        let place = |chunk: usize, kind| Place { chunk: chunk as u32, kind };
-        let order = (0..2).flat_map(|kind| (0..chunks).map(move |c| place(c, kind))).collect();
+        let id = |chunk: usize, kind| RangeId { chunk: chunk as u32, kind };
+        let order = (0..2).flat_map(|kind| (0..chunks).map(move |c| id(c, kind))).collect();
         let mut index =
             Index { layers: layer_forms(&[0], 1, false), chunks: (0..chunks).map(chunk).collect(), order };
-        index.place().unwrap();
+        index.lay_out().unwrap();
         index
     }
 

@@ -195,9 +195,9 @@ impl Integers {
     /// Codes all integers but the steps. A decoder gets the decoded ones in place of its own.
     fn code(&mut self, bits: &mut dyn Bits) -> Result<(), BrokenHead> {
         for (group, zeros) in self.groups() {
-            let mut odds = SignedBitModel::default();
+            let mut model = SignedBitModel::default();
             for number in group {
-                let coded = bits.signed(&mut odds, i32::from(*number >> zeros)) << zeros;
+                let coded = bits.signed(&mut model, i32::from(*number >> zeros)) << zeros;
                 *number = i16::try_from(coded)
                     .map_err(|_| BrokenHead(format!("the integers: {coded} is not from -32768 to 32767")))?;
             }

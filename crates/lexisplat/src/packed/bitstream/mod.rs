@@ -43,7 +43,7 @@ pub(in crate::packed) use axes::rounded as rounded_axes;
 pub(in crate::packed) use chunk::{CodedChunk, Form, LayerForm, RecordedRange, lanes};
 pub(in crate::packed) use head::Head;
 pub(crate) use head::atoms_of_head;
-pub(in crate::packed) use index::{Chunk, Index, Place, Range, layer_forms};
+pub(in crate::packed) use index::{Chunk, Index, Range, RangeId, layer_forms};
 pub(in crate::packed) use parameters::{CHANGES, KINDS};
 pub(in crate::packed) use points_of_view::{PointsOfView, seen_row};
 pub(in crate::packed) use sh_codes::RestForm;

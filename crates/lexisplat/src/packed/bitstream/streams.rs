@@ -125,7 +125,7 @@ impl Slot {
 impl Slot {
     /// Returns the number of the context `context` of this set among all contexts.
     #[inline(always)]
-    pub(in crate::packed) fn place(self, context: u32) -> usize {
+    pub(in crate::packed) fn table_index(self, context: u32) -> usize {
         self.number * CONTEXTS + (context as usize).min(CONTEXTS - 1)
     }
 }

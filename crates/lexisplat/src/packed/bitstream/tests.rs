@@ -36,15 +36,15 @@ fn indexes(sh_parts: usize, interim: bool) -> impl Strategy<Value = Index> {
             }
             index.chunks.sort_by_key(|chunk| (chunk.layer, chunk.cell));
             let all = index.chunks.iter().zip(0_u32..);
-            let place = |(chunk, number): (&Chunk, u32)| {
-                (0..chunk.ranges.len() as u8).map(move |kind| Place { chunk: number, kind })
+            let ids = |(chunk, number): (&Chunk, u32)| {
+                (0..chunk.ranges.len() as u8).map(move |kind| RangeId { chunk: number, kind })
             };
-            index.order = all.flat_map(place).collect();
+            index.order = all.flat_map(ids).collect();
             // Any order is allowed in which bases come first.
             index.order.sort_by_key(|p| {
                 (p.kind > 0, u64::from(p.chunk * 8 + u32::from(p.kind)).wrapping_mul(seed | 1))
             });
-            index.place().unwrap();
+            index.lay_out().unwrap();
             index
         },
     )
@@ -77,8 +77,8 @@ proptest! {
         prop_assert_eq!(index.gaussians(), gaussians);
         // Ranges lie one after the other in the data.
         let mut end = 0;
-        for place in &index.order {
-            let range = index.chunks[place.chunk as usize].ranges[usize::from(place.kind)];
+        for id in &index.order {
+            let range = index.chunks[id.chunk as usize].ranges[usize::from(id.kind)];
             prop_assert_eq!(range.start, end);
             end += u64::from(range.length);
         }
@@ -98,7 +98,7 @@ proptest! {
         bytes[at] ^= bits;
         if let Some(other) = read(&bytes, 2, true) {
             prop_assert!(other != index);
-            // Places of sorted ranges may be listed too, and are not written.
+            // Ids of sorted ranges may be listed too, and are not written.
             prop_assert!(written(&other) == bytes || bytes[0] < 0x80);
             prop_assert!(read(&written(&other), 2, true) == Some(other));
         }
@@ -112,10 +112,10 @@ fn two_layers() -> Index {
         Chunk { layer, gaussians, ranges: vec![range; kinds], ..Chunk::default() }
     };
     let chunks = vec![chunk(0, 20, 6), chunk(0, 9, 6), chunk(1, 1000, 4)];
-    let place = |chunk: u32, kinds: u8| (0..kinds).map(move |kind| Place { chunk, kind });
-    let order = place(0, 6).chain(place(2, 4)).chain(place(1, 6)).collect();
+    let ids = |chunk: u32, kinds: u8| (0..kinds).map(move |kind| RangeId { chunk, kind });
+    let order = ids(0, 6).chain(ids(2, 4)).chain(ids(1, 6)).collect();
     let mut index = Index { layers: layer_forms(&[2, 1], 2, true), chunks, order };
-    index.place().unwrap();
+    index.lay_out().unwrap();
     index
 }
 

@@ -2,7 +2,7 @@
 
 use crate::support::builder::builder_methods;
 
-/// A place from which a scene is looked at, for the choice of chunks.
+/// A position from which a scene is looked at, for the choice of chunks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Eye {

@@ -11,7 +11,7 @@ use crate::packed::bitstream::streams::Stream;
 use crate::packed::decode::available_ranges::{Data, DecodeOptions};
 use crate::packed::decode::chunk_unpack::{Refusal, Unpacker};
 use crate::packed::decode::outline::RangeKind;
-use crate::packed::decode::place::{Piece, Place};
+use crate::packed::decode::output::{ChunkOutput, Piece};
 use crate::packed::entropy::tables::{Lookup, Tables};
 use crate::packed::scene::PackedHead;
 use crate::scene::sh::ShDegree;
@@ -71,7 +71,7 @@ impl BitstreamDecoder {
         &self.head.index
     }
 
-    /// Decodes chunk `c` into `place`, from the ranges that `data` has. The escapes in the result are numbered from
+    /// Decodes chunk `c` into `output`, from the ranges that `data` has. The escapes in the result are numbered from
     /// `first`.
     #[expect(clippy::too_many_arguments, reason = "what is decoded, from what and where to")]
     pub(in crate::packed) fn piece(
@@ -80,7 +80,7 @@ impl BitstreamDecoder {
         c: usize,
         first: usize,
         options: DecodeOptions,
-        place: &mut Place<'_>,
+        output: &mut ChunkOutput<'_>,
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
@@ -99,7 +99,7 @@ impl BitstreamDecoder {
             *interim = None;
         }
         let want = Want { sums: options.verify, bits: count_bits };
-        let piece = self.unpacker.chunk(form, chunk.cell, &uncovered, &ranges, want, place, budget);
+        let piece = self.unpacker.chunk(form, chunk.cell, &uncovered, &ranges, want, output, budget);
         let (mut piece, sums) = piece.map_err(|refusal| match refusal {
             Refusal::Damaged(InRange { range, broken: Broken(rule) }) => {
                 let kind = RangeKind::of(form, range);
@@ -109,17 +109,17 @@ impl BitstreamDecoder {
         })?;
         for (k, (sum, _)) in sums.iter().zip(&ranges).enumerate().filter(|(_, (_, range))| range.is_some()) {
             if chunk.ranges.get(k).is_none_or(|range| range.integers != *sum) {
-                let part = format!("the integers of range {k} of chunk {c}");
-                return Err(Error::format(&self.file, FormatError::Checksum { part }));
+                let covered = format!("the integers of range {k} of chunk {c}");
+                return Err(Error::format(&self.file, FormatError::Checksum { covered }));
             }
         }
         for escape in &mut piece.escapes.gaussians {
             *escape = u32::try_from(first + *escape as usize)
                 .map_err(|_| damaged("has exact rows of more than 2^32 Gaussians"))?;
         }
-        let most = place.counts.iter().copied().max().unwrap_or(0);
+        let most = output.counts.iter().copied().max().unwrap_or(0);
         if u64::from(most) > self.limits.nonzeros {
-            let i = place.counts.iter().position(|&count| count == most).unwrap_or(0);
+            let i = output.counts.iter().position(|&count| count == most).unwrap_or(0);
             self.limits.check_nonzeros(&self.file, chunk.first + i, most.into())?;
         }
         if piece.atoms.iter().max().is_some_and(|&atom| usize::from(atom) >= self.dictionary().len()) {
@@ -146,8 +146,8 @@ impl BitstreamDecoder {
             };
             let wanted = data.range(range.start, range.length).filter(|_| is_needed && is_wanted(k));
             if wanted.is_some_and(|bytes| !data.is_verified() && crc32::hash(bytes) != range.checksum) {
-                let part = format!("range {k} of chunk {c}");
-                return Err(Error::format(&self.file, FormatError::Checksum { part }));
+                let covered = format!("range {k} of chunk {c}");
+                return Err(Error::format(&self.file, FormatError::Checksum { covered }));
             }
             ranges.push(wanted);
         }

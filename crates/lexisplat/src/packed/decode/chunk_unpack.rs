@@ -13,7 +13,7 @@ use crate::packed::bitstream::halves::halved;
 use crate::packed::bitstream::parameters::LAST_CLASS;
 use crate::packed::bitstream::points_of_view::{MOST, PointsOfView, SeenAtoms, seen_row};
 use crate::packed::bitstream::sh_codes::{BLOCK, Coded, Cursor, Nonzero, Rest};
-use crate::packed::decode::place::{Piece, Place, indices};
+use crate::packed::decode::output::{ChunkOutput, Piece, indices};
 use crate::packed::entropy::lanes::{LANES, Lanes, each, has};
 use crate::packed::entropy::tables::Lookup;
 use crate::sparse::codes::Escapes;
@@ -33,7 +33,7 @@ pub(in crate::packed) struct Unpacker {
 }
 
 impl Unpacker {
-    /// Decodes a chunk of `layer` into `place`, from the ranges that are there. `cell` is the cell of its first Gaussian.
+    /// Decodes a chunk of `layer` into `output`, from the ranges that are there. `cell` is the cell of its first Gaussian.
     /// Gaussians in the cells `uncovered` get interim changes. Escapes are numbered from the start of the chunk. `budget`
     /// already holds everything but the codes, which are added to it. Returns the codes, and the checksums of integers if
     /// they are wanted.
@@ -45,11 +45,11 @@ impl Unpacker {
         uncovered: &[Range<u64>],
         ranges: &[Option<&[u8]>],
         want: Want,
-        place: &mut Place<'_>,
+        output: &mut ChunkOutput<'_>,
         budget: &MemoryBudget<'_>,
     ) -> Result<(Piece, Vec<u32>), Refusal> {
         // Registers of 512 bits were measured to be 5 to 10 % slower.
-        Simd::current().narrow().run(Job { with: self, layer, cell, uncovered, ranges, want, place, budget })
+        Simd::current().narrow().run(Job { with: self, layer, cell, uncovered, ranges, want, output, budget })
     }
 }
 
@@ -68,7 +68,7 @@ struct Job<'j, 'p, 'r> {
     uncovered: &'j [Range<u64>],
     ranges: &'j [Option<&'r [u8]>],
     want: Want,
-    place: &'j mut Place<'p>,
+    output: &'j mut ChunkOutput<'p>,
     budget: &'j MemoryBudget<'j>,
 }
 
@@ -86,14 +86,14 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let Self { with, layer, cell, uncovered, ranges, want, place, budget } = self;
-        let n = place.counts.len();
+        let Self { with, layer, cell, uncovered, ranges, want, output, budget } = self;
+        let n = output.counts.len();
         let starts = starts(n, crate::packed::bitstream::chunk::lanes(n));
         let blank = [[0.0; LANES]; 3];
         let positions = if with.points_of_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
         let mut out = Out {
             with,
-            place,
+            output,
             cell,
             uncovered,
             starts,
@@ -124,27 +124,27 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         if !values.iter().fold(true, |good, v| good & v.is_finite()) {
             return refused(1 + layer.refinements, "has an SH value that is infinite in f16");
         }
-        if !place.dc.as_flattened().iter().fold(true, |good, v| good & v.is_finite()) {
+        if !output.dc.as_flattened().iter().fold(true, |good, v| good & v.is_finite()) {
             return refused(0, "has a base colour that is not finite with SH-rest taken away");
         }
         Ok((Piece { atoms, values, escapes, bit_counts: played.bits }, played.sums))
     }
 }
 
-/// There is no place for a Gaussian. It does not occur, since places are as many as Gaussians of the chunk.
-const NO_PLACE: Broken = Broken("has more Gaussians than the index says");
+/// There is no output for a Gaussian. It does not occur, since the output is as long as the chunk.
+const NO_SUCH_GAUSSIAN: Broken = Broken("has more Gaussians than the index says");
 
 /// The output of a decoded chunk.
 struct Out<'j, 'p> {
     with: &'j Unpacker,
-    place: &'j mut Place<'p>,
+    output: &'j mut ChunkOutput<'p>,
     /// The cell of the first Gaussian.
     cell: u64,
     /// Cells around which the next layer is missing.
     uncovered: &'j [Range<u64>],
     /// Index of the first Gaussian of each lane.
     starts: [usize; LANES + 1],
-    /// The nonzeros of each lane. Those of one Gaussian are in ascending order of atoms.
+    /// The nonzeros of each lane. The nonzeros of one Gaussian are in ascending order of atoms.
     nonzeros: Lanes<Vec<Nonzero>>,
     escapes: Lanes<Escapes>,
     /// Positions of the Gaussians of the block. Empty if there are no points of view.
@@ -176,7 +176,7 @@ impl Sink for Out<'_, '_> {
             *position = drawn.position;
         }
         for l in (0..LANES).filter(|&l| has(set, l)) {
-            self.place.put(self.starts[l] + number, &drawn, l).ok_or(NO_PLACE)?;
+            self.output.put(self.starts[l] + number, &drawn, l).ok_or(NO_SUCH_GAUSSIAN)?;
         }
         drawn.check(set)
     }
@@ -216,7 +216,7 @@ impl Sink for Out<'_, '_> {
                 for sh_part in 0..form.least.len() {
                     match rest.coded(form, sh_part, k, l, &mut cursors[l]) {
                         Coded::Exact(row) => {
-                            self.escapes[l].gaussians.push(u32::try_from(i).map_err(|_| NO_PLACE)?);
+                            self.escapes[l].gaussians.push(u32::try_from(i).map_err(|_| NO_SUCH_GAUSSIAN)?);
                             self.escapes[l].rows.extend_from_slice(row);
                             exact = Some(row);
                         }
@@ -239,7 +239,7 @@ impl Sink for Out<'_, '_> {
                 let code = &nonzeros[first..];
                 let count = u8::try_from(code.len())
                     .map_err(|_| Broken("has a Gaussian with more nonzeros than coefficients"))?;
-                *self.place.counts.get_mut(i).ok_or(NO_PLACE)? = count;
+                *self.output.counts.get_mut(i).ok_or(NO_SUCH_GAUSSIAN)? = count;
                 if !has_points {
                     continue;
                 }
@@ -251,7 +251,7 @@ impl Sink for Out<'_, '_> {
                     }
                     None => self.with.seen_atoms.seen(code, &weights, l),
                 };
-                for (dc, added) in self.place.dc.get_mut(i).ok_or(NO_PLACE)?.iter_mut().zip(added) {
+                for (dc, added) in self.output.dc.get_mut(i).ok_or(NO_SUCH_GAUSSIAN)?.iter_mut().zip(added) {
                     *dc -= added;
                 }
             }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::available_ranges::{Data, DecodeOptions};
 use super::outline::Outline;
-use super::place::{Piece, Place, indices, places};
+use super::output::{ChunkOutput, Piece, chunk_outputs, indices};
 use crate::packed::bitstream::Index;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::decode::chunk_decoder::BitstreamDecoder;
@@ -98,25 +98,26 @@ impl Decoder {
         let span = self.spans.get(c).cloned().unwrap_or_default();
         let (mut g, mut counts) = (Geometry::zeros(span.len()), vec![0; span.len()]);
         let own = 0..span.len();
-        let mut place = places(&mut g, &mut counts, std::slice::from_ref(&own)).pop().unwrap_or_default();
-        let piece = self.piece(data, c, 0, &mut place, budget, count_bits)?;
+        let mut output =
+            chunk_outputs(&mut g, &mut counts, std::slice::from_ref(&own)).pop().unwrap_or_default();
+        let piece = self.piece(data, c, 0, &mut output, budget, count_bits)?;
         let (indices, values) = (indices(self.dictionary(), piece.atoms), Values::F16(piece.values));
         let codes = SparseCodes::part(self.dictionary(), span.start, counts, indices, values, piece.escapes)
             .map_err(|e| Error::malformed(&self.file, e.to_string()))?;
         Ok((g, codes, piece.bit_counts))
     }
 
-    /// Decodes available chunk `c` into `place`. The escapes in the result are numbered from `first`.
+    /// Decodes available chunk `c` into `output`. The escapes in the result are numbered from `first`.
     pub(in crate::packed) fn piece(
         &self,
         data: Data<'_>,
         c: usize,
         first: usize,
-        place: &mut Place<'_>,
+        output: &mut ChunkOutput<'_>,
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
         let c = self.chunks.get(c).copied().unwrap_or(usize::MAX);
-        self.decoder.piece(data, c, first, self.options, place, budget, count_bits)
+        self.decoder.piece(data, c, first, self.options, output, budget, count_bits)
     }
 }

@@ -9,7 +9,7 @@ pub(in crate::packed) mod chunk_decoder;
 pub(in crate::packed) mod chunk_unpack;
 pub(in crate::packed) mod decoder;
 pub(in crate::packed) mod outline;
-pub(in crate::packed) mod place;
+pub(in crate::packed) mod output;
 pub(in crate::packed) mod reorder;
 pub(in crate::packed) mod selection;
 pub(in crate::packed) mod unpack;

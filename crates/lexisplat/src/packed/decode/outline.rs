@@ -66,7 +66,7 @@ pub struct RangeOutline {
     pub chunk: usize,
     /// The kind of its content.
     pub kind: RangeKind,
-    /// Its place in the file, in bytes.
+    /// Its offset in the file, in bytes.
     pub bytes: Range<u64>,
     /// CRC-32 of its bytes.
     pub checksum: u32,
@@ -131,8 +131,8 @@ impl Outline {
             let (first, gaussians, bounds) = (chunk.first, chunk.gaussians, chunk.bounds);
             chunks.push(ChunkOutline { layer: chunk.layer, first, gaussians, bounds, next: index.around(c) });
         }
-        let range = |place: &crate::packed::bitstream::Place| {
-            let (chunk, kind) = (place.chunk as usize, usize::from(place.kind));
+        let range = |id: &crate::packed::bitstream::RangeId| {
+            let (chunk, kind) = (id.chunk as usize, usize::from(id.kind));
             let found = index.chunks.get(chunk)?;
             let range = found.ranges.get(kind)?;
             Some(RangeOutline {
@@ -158,7 +158,7 @@ impl Outline {
         }
     }
 
-    /// Returns the place in the file, in bytes, where the bases of the first layer end. With so many bytes the whole scene
+    /// Returns the offset in the file, in bytes, where the bases of the first layer end. With so many bytes the whole scene
     /// is drawn, as coarsely as that layer shows it.
     #[must_use]
     pub fn first_layer_end(&self) -> u64 {

@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use super::place::indices;
+use super::output::indices;
 use crate::scene::extra::for_extra;
 use crate::scene::splats::Geometry;
 use crate::sparse::codes::{CodedRest, Escapes, SparseCodes, Values};

@@ -279,7 +279,7 @@ mod tests {
         let outline = outline();
         let kinds: Vec<RangeKind> = all.ranges.iter().map(|&r| outline.ranges[r].kind).collect();
         assert_eq!(kinds[..4], [RangeKind::Base, RangeKind::Sh(0), RangeKind::Base, RangeKind::Sh(0)]);
-        // What does not fit is left out, and smaller steps follow.
+        // A step that does not fit is left out, and smaller steps follow.
         let tight = select(&eye, &Budget::default().with_bytes(1210_u64));
         assert_eq!((tight.chunks, tight.bytes), (vec![0], 1210));
     }

@@ -2,7 +2,7 @@
 
 use super::available_ranges::Data;
 use super::decoder::Decoder;
-use super::place::{indices, places};
+use super::output::{chunk_outputs, indices};
 use crate::packed::bitstream::stream::{BitCounts, StreamBits};
 use crate::packed::scene::Packed;
 use crate::scene::splats::Geometry;
@@ -38,10 +38,10 @@ impl Packed {
         }
     }
 
-    /// Returns the number of bits of each stream. Those of tables and other parameters are not counted.
+    /// Returns the number of bits of each stream. Bits of tables and other parameters are not counted.
     ///
     /// # Errors
-    /// Those of [`Self::unpack`].
+    /// As [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
         let (_, bits) = self.decode_with(&self.decoder()?, self.data(), true)?;
         Ok(bits.named())
@@ -50,7 +50,7 @@ impl Packed {
     /// Returns the dictionary alone.
     ///
     /// # Errors
-    /// Those of [`Self::unpack`].
+    /// As [`Self::unpack`].
     pub fn unpack_dictionary(&self) -> Result<Dictionary> {
         Ok(self.decoder()?.dictionary().clone())
     }
@@ -75,7 +75,7 @@ impl Packed {
     /// interim change. Its Gaussians are the first ones of the file. `None` if there is one layer.
     ///
     /// # Errors
-    /// Those of [`Self::unpack`].
+    /// As [`Self::unpack`].
     pub fn first_layer(&self) -> Result<Option<Model>> {
         let Some(end) = self.decoder()?.index().first_layer_end() else { return Ok(None) };
         let data = usize::try_from(end).ok().and_then(|end| self.data().get(..end)).unwrap_or_default();
@@ -92,11 +92,12 @@ impl Packed {
         let extras = if n == self.len() { self.extras().to_vec() } else { Vec::new() };
         let mut g = Geometry { extras, ..Geometry::zeros(n) };
         let mut counts = vec![0; n];
-        // Chunks are decoded into their final places, so that a scene is in memory once.
+        // Chunks are decoded into their parts of the scene, so that a scene is in memory once.
         let spans = decoder.spans();
-        let work: Vec<_> = places(&mut g, &mut counts, spans).into_iter().zip(spans).enumerate().collect();
-        let pieces = map_vec(work, |(c, (mut place, span))| {
-            decoder.piece(Data::First(data), c, span.start, &mut place, &budget, count_bits)
+        let work: Vec<_> =
+            chunk_outputs(&mut g, &mut counts, spans).into_iter().zip(spans).enumerate().collect();
+        let pieces = map_vec(work, |(c, (mut output, span))| {
+            decoder.piece(Data::First(data), c, span.start, &mut output, &budget, count_bits)
         });
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();

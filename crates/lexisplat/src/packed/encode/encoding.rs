@@ -9,8 +9,8 @@ use super::layering::Layering;
 use super::options::PackOptions;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::bitstream::{
-    Chunk, CodedChunk, Form, Head, Index, LayerForm, Place, Range, RecordedRange, Stream, WholeAtoms, lanes,
-    stream_of,
+    Chunk, CodedChunk, Form, Head, Index, LayerForm, Range, RangeId, RecordedRange, Stream, WholeAtoms,
+    lanes, stream_of,
 };
 use crate::packed::entropy::tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};
 use crate::packed::scene::{PackedHead, UNNAMED};
@@ -206,14 +206,14 @@ impl Encoding {
         chunks.sort_by_key(|(chunk, _): &(Chunk, f64)| chunk.layer);
         let (chunks, energies): (Vec<Chunk>, Vec<f64>) = chunks.into_iter().unzip();
         let order = layering.order(&chunks, &energies, sh_parts);
-        let piece = |place: &Place| {
-            let range = &chunks[place.chunk as usize].ranges[usize::from(place.kind)];
+        let piece = |id: &RangeId| {
+            let range = &chunks[id.chunk as usize].ranges[usize::from(id.kind)];
             (range.start, range.length as usize)
         };
         let pieces = order.iter().map(piece).collect();
         head.index = Index { layers: forms, chunks, order };
         let too_long = || Error::parameter("data", "too long", "as many bytes as memory counts");
-        head.index.place().ok_or_else(too_long)?;
+        head.index.lay_out().ok_or_else(too_long)?;
         let data = Woven::new(spill.finish()?, pieces);
         head.tables = tables.write();
         let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
@@ -250,9 +250,9 @@ impl Tables {
 #[derive(Debug)]
 pub(in crate::packed) struct Ranges {
     spill: Spill,
-    /// The place in the spill where the next range starts.
+    /// The offset in the spill where the next range starts.
     at: u64,
-    /// Each chunk, and the squared change of pictures without it. The starts of its ranges are places in the spill.
+    /// Each chunk, and the squared change of pictures without it. The starts of its ranges are offsets in the spill.
     chunks: Vec<(Chunk, f64)>,
 }
 

@@ -37,12 +37,12 @@ pub(in crate::packed) struct InterimChanges {
 }
 
 impl InterimChanges {
-    /// Computes the changes of the Gaussians at `places` of `g`. `places` holds all layers in the order of the file, and
+    /// Computes the changes of the Gaussians at `keys` of `g`. `keys` holds all layers in the order of the file, and
     /// `layers` the number of Gaussians of each. `probability(layer, i)` is the probability with which Gaussian `i` of
-    /// `places` was drawn into `layer`.
+    /// `keys` was drawn into `layer`.
     pub(in crate::packed) fn new(
         g: &Geometry,
-        places: &[MortonKey],
+        keys: &[MortonKey],
         layers: &[usize],
         probability: impl Fn(usize, usize) -> f64,
     ) -> Self {
@@ -50,7 +50,7 @@ impl InterimChanges {
         let mut start = 0;
         for (layer, count) in layers.iter().enumerate().take(changes.layers) {
             let end = start + count;
-            let missing = missing(g, &places[start..], *count);
+            let missing = missing(g, &keys[start..], *count);
             for (i, x) in (start..end).zip(missing) {
                 let rare = libm::log(probability(layer, i).max(f64::MIN_POSITIVE));
                 let grows = GROWTH * libm::log1p(MISSING * x) + RARE * rare;
@@ -87,15 +87,15 @@ impl InterimChanges {
 
 /// Returns the ratio `sum / own` for each Gaussian before `first`. `own` is its opacity times its area. `sum` is the
 /// opacity times area of all Gaussians from `first` on to which it is the nearest one before `first`.
-fn missing(g: &Geometry, places: &[MortonKey], first: usize) -> Vec<f64> {
-    let area = |place: &MortonKey| {
-        let mut scales = g.scales[place.index()];
+fn missing(g: &Geometry, keys: &[MortonKey], first: usize) -> Vec<f64> {
+    let area = |key: &MortonKey| {
+        let mut scales = g.scales[key.index()];
         scales.sort_by(f32::total_cmp);
         (scales[1] + scales[2]).exp()
     };
-    let area: Vec<f32> = places.iter().map(area).collect();
-    let mass = |i: usize| f64::from(log_sigmoid(g.opacities[places[i].index()]).exp() * area[i]);
-    let (ours, others) = places.split_at(first.min(places.len()));
+    let area: Vec<f32> = keys.iter().map(area).collect();
+    let mass = |i: usize| f64::from(log_sigmoid(g.opacities[keys[i].index()]).exp() * area[i]);
+    let (ours, others) = keys.split_at(first.min(keys.len()));
     // Each layer is in the order of cells, but several layers one after the other are not.
     let mut near: Vec<usize> = (0..ours.len()).collect();
     near.sort_by_key(|&i| ours[i].cell);

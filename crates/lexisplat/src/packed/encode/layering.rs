@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::options::PackOptions;
 use crate::packed::bitstream::index::MAX_LAYERS;
-use crate::packed::bitstream::{Chunk, LayerForm, Place, RestForm, layer_forms};
+use crate::packed::bitstream::{Chunk, LayerForm, RangeId, RestForm, layer_forms};
 
 /// Share of the Gaussians that are not in the last layer, for scenes with several layers.
 const COARSE_SHARE: f64 = 0.14;
@@ -125,7 +125,12 @@ impl Layering {
 
     /// Returns the order of the ranges of `chunks` in the data. Each chunk has `sh_parts` SH parts, and `energies`
     /// holds the sum of its Gaussians' energies.
-    pub(in crate::packed) fn order(&self, chunks: &[Chunk], energies: &[f64], sh_parts: usize) -> Vec<Place> {
+    pub(in crate::packed) fn order(
+        &self,
+        chunks: &[Chunk],
+        energies: &[f64],
+        sh_parts: usize,
+    ) -> Vec<RangeId> {
         let forms = self.forms(sh_parts);
         let mut order = Order { sh_parts, order: Vec::new(), finer: vec![0; chunks.len()] };
         let of = |layer: usize| (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
@@ -175,7 +180,7 @@ impl Layering {
 /// An order of ranges under construction.
 struct Order {
     sh_parts: usize,
-    order: Vec<Place>,
+    order: Vec<RangeId>,
     /// Number of refinements of each chunk that are in the order.
     finer: Vec<usize>,
 }
@@ -183,7 +188,7 @@ struct Order {
 impl Order {
     fn put(&mut self, chunk: usize, kind: usize) {
         #[expect(clippy::cast_possible_truncation, reason = "files have fewer chunks, and chunks few kinds")]
-        self.order.push(Place { chunk: chunk as u32, kind: kind as u8 });
+        self.order.push(RangeId { chunk: chunk as u32, kind: kind as u8 });
     }
 
     fn base(&mut self, chunk: usize, _: LayerForm) {

@@ -22,7 +22,7 @@ pub struct PackOptions {
     pub tolerance: Option<f64>,
     /// Number of atoms to learn, 1 to 1024. `None` lets the size of the scene decide.
     pub atoms: Option<usize>,
-    /// Stores the place of each Gaussian in the source. Then no Gaussian is left out.
+    /// Stores the index of each Gaussian in the source. Then no Gaussian is left out.
     pub keep_order: bool,
     /// Leaves no Gaussian out, and keeps base colours and opacities. A tolerance has the same effect.
     pub keep_all: bool,

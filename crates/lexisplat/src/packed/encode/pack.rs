@@ -20,7 +20,7 @@ use crate::support::maths::at_share;
 use crate::support::progress::Progress;
 
 /// Expected PSNR in dB at an overall step of `EXPECTED_STEP / sqrt(gaussians)`. This constant and the next three are fitted
-/// to held-out views of the models in docs/METHOD.md, which they miss by up to 3 dB.
+/// to held-out views of the models in docs/results, which they miss by up to 3 dB.
 const EXPECTED_DB: f64 = 40.0;
 const EXPECTED_STEP: f64 = 2.3e-3;
 /// Growth of the PSNR in dB when the step halves, and the growth of that growth.
@@ -86,7 +86,7 @@ impl<S: Borrow<Splats>> Packer<S> {
     /// Gaussians keep a share of their own size, turn, opacity and colour (docs/METHOD.md, "The floor").
     ///
     /// # Errors
-    /// Those of [`Self::quantise`] and [`Quantised::finish`].
+    /// As [`Self::quantise`] and [`Quantised::finish`].
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
         self.quantise(step, true, progress)?.finish(None, None, progress)
     }

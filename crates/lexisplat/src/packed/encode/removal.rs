@@ -81,7 +81,7 @@ impl Influence {
         }
     }
 
-    /// Returns the places of the Gaussians that stay at the overall step `step`. At least one stays, if there are any.
+    /// Returns the indices of the Gaussians that stay at the overall step `step`. At least one stays, if there are any.
     pub(in crate::packed) fn kept(&self, step: f64) -> Vec<usize> {
         let kept: Vec<usize> =
             (0..self.left_out.len()).filter(|&i| is_worth_its_bits(self.left_out[i], step)).collect();

@@ -45,9 +45,9 @@ pub(in crate::packed) trait Bits {
     /// Codes a bit that is 0 with the probability `zero`.
     fn split(&mut self, zero: u16, bit: bool) -> bool;
 
-    fn bit(&mut self, odds: &mut BitModel, bit: bool) -> bool {
-        let bit = self.split(odds.zero(), bit);
-        odds.learn(bit);
+    fn bit(&mut self, model: &mut BitModel, bit: bool) -> bool {
+        let bit = self.split(model.zero(), bit);
+        model.learn(bit);
         bit
     }
 
@@ -56,13 +56,13 @@ pub(in crate::packed) trait Bits {
         (0..count).rev().fold(0, |all, k| all << 1 | u32::from(self.split(HALF, value >> k & 1 == 1)))
     }
 
-    /// Codes a number from 1 to less than `2^odds.len()`. Its length in bits is coded in unary with adaptive probabilities.
+    /// Codes a number from 1 to less than `2^models.len()`. Its length in bits is coded in unary with adaptive probabilities.
     /// The bits after the leading one follow with even probabilities.
-    fn positive(&mut self, odds: &mut [BitModel], value: u32) -> u32 {
+    fn positive(&mut self, models: &mut [BitModel], value: u32) -> u32 {
         let wanted = u32::BITS - value.max(1).leading_zeros();
         let mut length = 1;
-        for odds in odds.iter_mut().skip(1) {
-            if !self.bit(odds, length < wanted) {
+        for model in models.iter_mut().skip(1) {
+            if !self.bit(model, length < wanted) {
                 break;
             }
             length += 1;
@@ -71,12 +71,12 @@ pub(in crate::packed) trait Bits {
     }
 
     /// Codes a number with a sign.
-    fn signed(&mut self, odds: &mut SignedBitModel, value: i32) -> i32 {
-        if !self.bit(&mut odds.nonzero, value != 0) {
+    fn signed(&mut self, model: &mut SignedBitModel, value: i32) -> i32 {
+        if !self.bit(&mut model.nonzero, value != 0) {
             return 0;
         }
-        let negative = self.bit(&mut odds.negative, value < 0);
-        let size = self.positive(&mut odds.size, value.unsigned_abs()).cast_signed();
+        let negative = self.bit(&mut model.negative, value < 0);
+        let size = self.positive(&mut model.size, value.unsigned_abs()).cast_signed();
         if negative { -size } else { size }
     }
 }
@@ -194,16 +194,17 @@ mod tests {
             let values: Vec<i32> =
                 (0..count).map(|_| (rng.next() as i32 >> 17) >> (rng.next() % 15)).collect();
             let walk = |bits: &mut Coder<'_>| {
-                let (mut odds, mut lengths) = (SignedBitModel::default(), [BitModel::default(); 15]);
-                values.iter().map(|&v| bits(&mut odds, &mut lengths, v)).collect::<Vec<_>>()
+                let (mut model, mut lengths) = (SignedBitModel::default(), [BitModel::default(); 15]);
+                values.iter().map(|&v| bits(&mut model, &mut lengths, v)).collect::<Vec<_>>()
             };
             let mut encoder = BitEncoder::default();
-            let written = walk(&mut |odds, lengths, v| {
-                (encoder.signed(odds, v), encoder.positive(lengths, v.unsigned_abs().clamp(1, 0x7fff)))
+            let written = walk(&mut |model, lengths, v| {
+                (encoder.signed(model, v), encoder.positive(lengths, v.unsigned_abs().clamp(1, 0x7fff)))
             });
             let bytes = encoder.finish();
             let mut decoder = BitDecoder::new(&bytes);
-            let read = walk(&mut |odds, lengths, _| (decoder.signed(odds, 0), decoder.positive(lengths, 0)));
+            let read =
+                walk(&mut |model, lengths, _| (decoder.signed(model, 0), decoder.positive(lengths, 0)));
             assert_eq!(written, read);
             assert!(written.iter().zip(&values).all(|(w, v)| w.0 == *v));
             assert_eq!(decoder.finish("bits"), Ok(()));
@@ -214,9 +215,9 @@ mod tests {
     #[test]
     fn runs_of_likely_bits_take_few_bytes() {
         let mut encoder = BitEncoder::default();
-        let mut odds = BitModel::default();
+        let mut model = BitModel::default();
         (0..4000).for_each(|k| {
-            encoder.bit(&mut odds, k % 500 == 499);
+            encoder.bit(&mut model, k % 500 == 499);
         });
         assert!(encoder.finish().len() < 40);
     }

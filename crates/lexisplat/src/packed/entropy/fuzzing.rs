@@ -2,7 +2,7 @@
 
 use crate::packed::Packed;
 use crate::packed::bitstream::head::Head;
-use crate::packed::bitstream::index::Place;
+use crate::packed::bitstream::index::RangeId;
 use crate::packed::entropy::lanes::LANES;
 use crate::packed::entropy::rans_decoder::SymbolDecoder;
 use crate::packed::entropy::rans_encoder::SymbolRecorder;
@@ -73,9 +73,9 @@ pub fn parts(packed: &Packed) -> [Vec<u8>; 2] {
     let Ok(head) = Head::read(&packed.head().bytes, packed.head().degree.rest()) else {
         return Default::default();
     };
-    let length = head.index.order.first().and_then(|place| {
-        let chunk = head.index.chunks.get(place.chunk as usize)?;
-        Some(chunk.ranges.get(usize::from(place.kind))?.length as usize)
+    let length = head.index.order.first().and_then(|id| {
+        let chunk = head.index.chunks.get(id.chunk as usize)?;
+        Some(chunk.ranges.get(usize::from(id.kind))?.length as usize)
     });
     [head.tables, packed.data().get(..length.unwrap_or(0)).unwrap_or_default().to_vec()]
 }
@@ -109,21 +109,21 @@ pub fn rearranged(
 ) -> Option<(Vec<u8>, Vec<u8>, usize)> {
     let mut head = Head::read(head, degree.rest()).ok()?;
     let index = &mut head.index;
-    let bytes = |place: &Place| {
-        let range = index.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind))?;
+    let bytes = |id: &RangeId| {
+        let range = index.chunks.get(id.chunk as usize)?.ranges.get(usize::from(id.kind))?;
         let rest = data.get(usize::try_from(range.start).ok()?..)?;
-        Some((*place, rest.get(..range.length as usize)?.to_vec()))
+        Some((*id, rest.get(..range.length as usize)?.to_vec()))
     };
-    let mut ranges: Vec<(Place, Vec<u8>)> = index.order.iter().map(bytes).collect::<Option<_>>()?;
+    let mut ranges: Vec<(RangeId, Vec<u8>)> = index.order.iter().map(bytes).collect::<Option<_>>()?;
     let c = below(index.chunks.len());
     let chunk = index.chunks.get(c)?.clone();
     let c = u32::try_from(c).ok()?;
     let (a, b) = (below(ranges.len()), below(ranges.len()));
     match below(8) {
         0..=2 if index.gaussians() < MOST_COPIED => {
-            let own: Vec<(Place, Vec<u8>)> = ranges.iter().filter(|(p, _)| p.chunk == c).cloned().collect();
+            let own: Vec<(RangeId, Vec<u8>)> = ranges.iter().filter(|(p, _)| p.chunk == c).cloned().collect();
             ranges.iter_mut().filter(|(p, _)| p.chunk > c).for_each(|(p, _)| p.chunk += 1);
-            ranges.extend(own.into_iter().map(|(p, bytes)| (Place { chunk: c + 1, ..p }, bytes)));
+            ranges.extend(own.into_iter().map(|(p, bytes)| (RangeId { chunk: c + 1, ..p }, bytes)));
             index.chunks.insert(c as usize + 1, chunk);
         }
         3 => {
@@ -143,12 +143,12 @@ pub fn rearranged(
             chunk.bounds.iter_mut().for_each(|bound| bound.rotate_left(1));
         }
     }
-    index.order = ranges.iter().map(|(place, _)| *place).collect();
-    for (place, bytes) in &ranges {
-        let range = index.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
+    index.order = ranges.iter().map(|(id, _)| *id).collect();
+    for (id, bytes) in &ranges {
+        let range = index.chunks.get_mut(id.chunk as usize)?.ranges.get_mut(usize::from(id.kind))?;
         range.length = u32::try_from(bytes.len()).ok()?;
     }
-    index.place()?;
+    index.lay_out()?;
     let gaussians = index.gaussians();
     let data = ranges.into_iter().flat_map(|(_, bytes)| bytes).collect();
     Some((head.write(), data, gaussians))

@@ -111,7 +111,7 @@ impl<'a> SymbolDecoder<'a> {
 
     /// Takes the next symbol of each lane whose context is not [`IDLE`], by the table of the context.
     ///
-    /// It must not be inlined. The walk takes symbols in dozens of places, and with this code in each of them it would not
+    /// It must not be inlined. The walk takes symbols by dozens of calls, and with this code in each of them it would not
     /// fit into the instruction cache.
     #[inline(never)]
     fn take<const PRECISION: u32>(&mut self, number: usize, context: &Lanes<u32>, set: u32) -> Lanes<u32> {

@@ -38,7 +38,7 @@ impl Symbols for SymbolRecorder {
         let mut out = [0; LANES];
         for l in (0..LANES).filter(|&l| has(set, l)) {
             out[l] = value(l);
-            self.lanes[l].push((slot.place(context[l]) as u32) << 8 | out[l]);
+            self.lanes[l].push((slot.table_index(context[l]) as u32) << 8 | out[l]);
         }
         out
     }

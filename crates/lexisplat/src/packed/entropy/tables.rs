@@ -157,14 +157,14 @@ impl Tables {
 
     /// Codes the numbers of tables of contexts, and the tables. A decoder codes empty ones and gets the decoded ones.
     fn code(&self, bits: &mut dyn Bits) -> Result<Self, BrokenHead> {
-        let mut odds = TablesOdds::default();
+        let mut models = TablesModels::default();
         let mut all = Self { map: Vec::with_capacity(ALL_CONTEXTS), tables: Vec::with_capacity(SLOTS) };
         let mut before = false;
         for slot in Slot::all() {
             let own = self.tables.get(slot.number).map_or(&[][..], Vec::as_slice);
-            before = bits.bit(&mut odds.used[usize::from(before)], !own.is_empty());
+            before = bits.bit(&mut models.used[usize::from(before)], !own.is_empty());
             let mut count = usize::from(before);
-            if !before || !bits.bit(&mut odds.many, own.len() > 1) {
+            if !before || !bits.bit(&mut models.many, own.len() > 1) {
                 all.map.extend([0; CONTEXTS]);
             } else {
                 let mut last = 0;
@@ -173,10 +173,10 @@ impl Tables {
                     let wanted = self.map.get(slot.number * CONTEXTS + context).copied().unwrap_or(NONE);
                     // A context that is never used has the table of the context before.
                     let wanted = if wanted == NONE { last } else { usize::from(wanted) };
-                    let same = &mut odds.same[usize::from(all.map.len() % CONTEXTS > 1 && odds.changed)];
-                    odds.changed = bits.bit(same, wanted != last);
-                    if odds.changed {
-                        last = match bits.bit(&mut odds.new, wanted == count) {
+                    let same = &mut models.same[usize::from(all.map.len() % CONTEXTS > 1 && models.changed)];
+                    models.changed = bits.bit(same, wanted != last);
+                    if models.changed {
+                        last = match bits.bit(&mut models.new, wanted == count) {
                             true => count,
                             false => {
                                 let width = usize::BITS - (count - 1).leading_zeros();
@@ -197,7 +197,7 @@ impl Tables {
             for k in 0..count {
                 let none = LogProbabilities::default();
                 let levels = own.get(k).map_or(&none, |table| &table.levels);
-                let levels = levels.code(bits, &mut odds.levels, precision)?;
+                let levels = levels.code(bits, &mut models.levels, precision)?;
                 let no_symbols = || BrokenHead("the tables: a table has no symbols".to_owned());
                 tables.push(Table::new(levels, precision).ok_or_else(no_symbols)?);
             }
@@ -209,7 +209,7 @@ impl Tables {
 
 /// The adaptive probabilities of the bits of [`Tables`].
 #[derive(Debug, Default)]
-struct TablesOdds {
+struct TablesModels {
     /// Whether a set of contexts is used, by whether the set before is.
     used: [BitModel; 2],
     /// Whether a set has several tables.
@@ -299,7 +299,7 @@ fn join_groups(groups: &mut Vec<Group>, cost: impl Fn(&Histogram) -> f64) {
 const MOST_PRECISION: u32 = 12;
 /// Number of entries of a set: at least one for each context. It is a power of two, so that a masked number is a valid
 /// index.
-const PLACES: usize = CONTEXTS.next_power_of_two();
+const SET_SLOTS: usize = CONTEXTS.next_power_of_two();
 /// The context of lanes that take no symbol. They get 0, and their states do not change.
 pub(in crate::packed) const IDLE: u32 = CONTEXTS as u32;
 
@@ -308,7 +308,7 @@ pub(in crate::packed) const IDLE: u32 = CONTEXTS as u32;
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Lookup {
     /// The start of the table of each context in `entries`, set by set.
-    sets: Vec<[u32; PLACES]>,
+    sets: Vec<[u32; SET_SLOTS]>,
     entries: Vec<Entry>,
 }
 
@@ -337,7 +337,7 @@ impl Lookup {
                     entries.extend((0..interval.share).map(|over| entry(symbol, interval.share, over)));
                 }
             }
-            let mut set = [idle[slot.stream.precision() as usize]; PLACES];
+            let mut set = [idle[slot.stream.precision() as usize]; SET_SLOTS];
             let mut last = 0;
             for (start, &table) in set.iter_mut().zip(map) {
                 // A context that is never used has the table of the context before, as in the written form.
@@ -360,7 +360,7 @@ impl Lookup {
 /// The tables of a set of contexts.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::packed) struct Set<'l> {
-    starts: &'l [u32; PLACES],
+    starts: &'l [u32; SET_SLOTS],
     entries: &'l [Entry],
 }
 
@@ -371,7 +371,7 @@ impl Set<'_> {
     /// Returns the entry for `low` in the table of `context`, which is below [`CONTEXTS`] or is [`IDLE`].
     #[inline(always)]
     pub(in crate::packed) fn entry(&self, context: u32, low: u32) -> Entry {
-        let start = self.starts[context as usize % PLACES];
+        let start = self.starts[context as usize % SET_SLOTS];
         self.entries.get((start + low) as usize).copied().unwrap_or(0)
     }
 }
@@ -394,7 +394,7 @@ pub(in crate::packed) fn over(entry: Entry) -> u32 {
     entry >> (8 + MOST_PRECISION)
 }
 
-const _: () = assert!((IDLE as usize) < PLACES);
+const _: () = assert!((IDLE as usize) < SET_SLOTS);
 
 #[cfg(test)]
 mod tests {

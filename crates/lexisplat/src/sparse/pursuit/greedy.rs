@@ -197,7 +197,7 @@ impl Plan {
             for (r, &c) in right[..l].iter_mut().zip(column) {
                 *r -= c * value;
             }
-            // The place of an atom in `code` is the number of chosen atoms below it. The count has no branch that depends
+            // The index of an atom in `code` is the number of chosen atoms below it. The count has no branch that depends
             // on the atoms.
             let atom = s.chosen[l];
             let before: u16 = s.chosen[..k].iter().map(|&other| u16::from(other < atom)).sum();

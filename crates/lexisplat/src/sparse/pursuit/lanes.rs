@@ -56,7 +56,7 @@ pub(crate) fn transposed(dim: usize, atoms: &[f32]) -> Vec<Lane> {
 }
 
 /// Folds `rows` into lanes and writes the lanes to `sums`. Lane b begins as `from(b)`. For each l in order,
-/// `f(entry, factors[l], x)` replaces every entry, where `x` is the entry at the same place in row l. Each row is as long
+/// `f(entry, factors[l], x)` replaces every entry, where `x` is the entry at the same index in row l. Each row is as long
 /// as `sums`.
 ///
 /// Each group of lanes stays in registers for all of `factors`.

@@ -213,7 +213,7 @@ fn buckets_make_a_file_that_is_as_good() {
     let ratio = found.len() as f64 / whole.len() as f64;
     assert!((0.97..1.03).contains(&ratio), "{ratio}");
     let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
-    // The order was kept, so each Gaussian is at its place in the source.
+    // The order was kept, so each Gaussian is at its index in the source.
     assert_eq!(model.geometry().extras, splats.geometry.extras);
     let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
     let moved = model.geometry().positions.iter().zip(&splats.geometry.positions).filter(|&p| far(p));

@@ -6,7 +6,7 @@
 
 mod destination;
 mod group;
-mod place;
+mod resolved;
 mod temporary;
 #[cfg(target_os = "linux")]
 mod unnamed;
@@ -16,7 +16,7 @@ use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use self::destination::folder_of;
-use self::place::{Place, in_folder, place};
+use self::resolved::{Resolved, in_folder, resolved};
 use self::temporary::Temporary;
 use crate::support::error::{Error, Result};
 
@@ -36,7 +36,7 @@ impl Output<'_> {
     /// [`Error::Io`] if the path is a folder, if a file exists that must not be replaced, or if the folder around
     /// it is missing or not writable. [`Error::Parameter`] if the path is a block device.
     pub fn check(&self) -> Result<()> {
-        if let Place::File(target) = place(self)? {
+        if let Resolved::File(target) = resolved(self)? {
             let folder = folder_of(&target);
             tempfile::tempfile_in(folder).map_err(|e| Error::io(self.path, in_folder(folder, e)))?;
         }
@@ -49,9 +49,9 @@ impl Output<'_> {
     /// # Errors
     /// As [`check`](Self::check).
     pub(crate) fn spill_folder(&self) -> Result<PathBuf> {
-        Ok(match place(self)? {
-            Place::File(target) => folder_of(&target).to_owned(),
-            Place::Special => std::env::temp_dir(),
+        Ok(match resolved(self)? {
+            Resolved::File(target) => folder_of(&target).to_owned(),
+            Resolved::Special => std::env::temp_dir(),
         })
     }
 
@@ -89,14 +89,14 @@ pub fn write_whole<'a, T>(
         let done = write(&mut writer)?;
         Ok((writer.into_inner().map_err(|e| io(e.into_error()))?, done))
     };
-    let whole = || match place(&output)? {
-        Place::Special => {
+    let whole = || match resolved(&output)? {
+        Resolved::Special => {
             let file = OpenOptions::new().write(true).open(output.path).map_err(io)?;
             let (_, done) = fill(file)?;
             group.count().map_err(io)?;
             Ok(done)
         }
-        Place::File(target) => {
+        Resolved::File(target) => {
             let folder = folder_of(&target);
             let (file, temporary) =
                 Temporary::create(folder, &group).map_err(|e| io(in_folder(folder, e)))?;

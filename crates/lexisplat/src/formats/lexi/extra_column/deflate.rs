@@ -88,7 +88,7 @@ mod tests {
             self
         }
 
-        /// Adds the start of a dynamic block with `count` literals and lengths. Those not in `literals` have no code.
+        /// Adds the start of a dynamic block with `count` literals and lengths. Literals that are not in `literals` have no code.
         fn block(self, last: bool, literals: &[(usize, usize)], count: usize, distances: &[usize]) -> Self {
             let mut out = self.number(last.into(), 1).number(2, 2);
             out = out.number(count - 257, 5).number(distances.len() - 1, 5).number(15, 4);

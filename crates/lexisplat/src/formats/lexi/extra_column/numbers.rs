@@ -4,7 +4,7 @@ use super::deflate;
 
 /// The way in which a list of numbers lies in its streams.
 ///
-/// Each filter took fewest bytes on some columns: plain bytes on places in palettes that repeat, planes on noise,
+/// Each filter took fewest bytes on some columns: plain bytes on indices in palettes that repeat, planes on noise,
 /// differences on smooth values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -23,7 +23,7 @@ impl Filter {
 
 /// Appends the filter and the streams of `numbers`, each of `width` bytes. The filter is the one with fewest bytes.
 pub(super) fn put(numbers: &[u64], width: usize, out: &mut Vec<u8>) {
-    // For numbers of one byte, plain bytes are the same as the one plane. For numbers of more than 2 bytes, which no place
+    // For numbers of one byte, plain bytes are the same as the one plane. For numbers of more than 2 bytes, which no index
     // in a palette has, plain bytes never took fewest bytes.
     let tries = Filter::ALL.iter().filter(|&&filter| width == 2 || filter != Filter::Plain);
     let best = tries.map(|&filter| put_with(filter, numbers, width)).min_by_key(Vec::len);

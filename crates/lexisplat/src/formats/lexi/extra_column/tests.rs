@@ -176,12 +176,12 @@ fn blocks_that_no_encoder_makes_are_refused() {
         deflate::put(bytes, &mut out);
         out
     };
-    let palette = |last: u16, values: &[u8], places: &[u8]| {
-        column_of(&[&[4], &last.to_le_bytes()[..], &numbers(1, values), &numbers(2, places)].concat())
+    let palette = |last: u16, values: &[u8], indices: &[u8]| {
+        column_of(&[&[4], &last.to_le_bytes()[..], &numbers(1, values), &numbers(2, indices)].concat())
     };
     assert_eq!(decode(&palette(1, &[7, 9], &[0, 1, 1]), 3).unwrap(), vec![7_u8, 9, 9].into());
     let damaged = Err(ColumnError::Block(0));
-    // A place beyond the palette, a palette longer than the block, and a palette of another length than stated.
+    // An index beyond the palette, a palette longer than the block, and a palette of another length than stated.
     assert_eq!(decode(&palette(1, &[7, 9], &[0, 1, 2]), 3), damaged);
     assert_eq!(decode(&palette(3, &[7, 9, 1, 2], &[0, 1, 1]), 3), damaged);
     assert_eq!(decode(&palette(1, &[7, 9, 1], &[0, 1, 1]), 3), damaged);

@@ -33,7 +33,7 @@ const FIRST_BYTES: usize = LENGTH_BYTES + 1;
 
 /// A reader of a packed .lexi file that is fed bytes as they come.
 ///
-/// [`Self::wants`] says which bytes to fetch next. What comes is given to [`Self::feed`] in pieces of any size and in any order,
+/// [`Self::wants`] says which bytes to fetch next. The bytes are given to [`Self::feed`] in pieces of any size and in any order,
 /// also more than was asked for, such as the first 64 KiB of the file instead of its first 9 bytes. Every range
 /// is checked when it is whole. [`Self::decode`] decodes a chunk from the ranges that are there. A
 /// chunk is complete when nothing more of it is wanted, and then [`Self::forget`] makes room.
@@ -74,7 +74,7 @@ pub struct LexiFeed {
     limits: Limits,
     /// The first bytes of the file, as many as are needed so far.
     start: Run,
-    /// What came before it is known what it is.
+    /// Bytes that came before their meaning is known.
     early: Vec<(u64, Box<[u8]>)>,
     ranges: Option<Box<Ranges>>,
 }
@@ -130,7 +130,7 @@ impl LexiFeed {
         self.early.iter().map(|(_, bytes)| bytes.len() as u64).sum()
     }
 
-    /// Takes `bytes` that are in the file from `at` on. Those that are not wanted or there already are dropped.
+    /// Takes `bytes` that are in the file from `at` on. Bytes that are not wanted or there already are dropped.
     ///
     /// # Errors
     /// [`Error::Limit`] if more would be held than [`FeedOptions::most_bytes`]; nothing is taken then. [`Error::Format`] for
@@ -202,7 +202,7 @@ impl LexiFeed {
             None => return Ok(()),
         };
         self.ranges = Some(Box::new(ranges));
-        // What there is no room for is asked for later.
+        // Ranges for which there is no room are asked for later.
         let unless_full = |result: Result<()>| match result {
             Err(Error::Limit { .. }) => Ok(()),
             other => other,
@@ -232,7 +232,7 @@ impl LexiFeed {
             return Err(checked.malformed("the layout is not 'packed'"));
         }
         let head = super::packed::head(&checked, &self.limits)?;
-        let (data_start, data_bytes) = super::packed::data_place(&checked);
+        let (data_start, data_bytes) = super::packed::data_span(&checked);
         let mut decoder = Decoder::new(&head, data_bytes)?;
         decoder.options.sh_parts = self.options.sh_parts;
         decoder.options.verify = self.options.verify_integers;
@@ -245,7 +245,7 @@ impl LexiFeed {
         Ok(Ranges::new(head, decoder, outline, data_start, &self.options))
     }
 
-    /// What the file says of itself, once its start came.
+    /// Returns the header of the file, once its start came.
     #[must_use]
     pub fn head(&self) -> Option<&PackedHead> {
         self.ranges.as_ref().map(|ranges| &ranges.head)

@@ -2,7 +2,7 @@
 
 use crate::support::builder::builder_methods;
 
-/// What a [`LexiFeed`](super::LexiFeed) asks for.
+/// The requests of a [`LexiFeed`](super::LexiFeed).
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct FeedOptions {

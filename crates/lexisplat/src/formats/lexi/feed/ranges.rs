@@ -12,7 +12,7 @@ use crate::support::error::{Error, FormatError, Result};
 /// what a link of 10 Mbit/s brings in 3 ms.
 const SKIPPED: u64 = 4 << 10;
 
-/// What a file is decoded with, and its ranges.
+/// The decoder of a file, and its ranges.
 #[derive(Debug)]
 pub(super) struct Ranges {
     pub(super) head: PackedHead,
@@ -172,8 +172,8 @@ impl Ranges {
 
     fn wrong(&self, range: &RangeOutline) -> Error {
         let k = self.outline.number(range);
-        let part = format!("range {k} of chunk {}", range.chunk);
-        Error::format(&self.head.file, FormatError::Checksum { part })
+        let covered = format!("range {k} of chunk {}", range.chunk);
+        Error::format(&self.head.file, FormatError::Checksum { covered })
     }
 
     /// The states of the ranges of chunk `c`.

@@ -51,9 +51,9 @@ impl Run {
     pub(super) fn put(&mut self, at: u64, bytes: &[u8]) {
         let from = at.max(self.start);
         let to = at.saturating_add(bytes.len() as u64).min(self.end());
-        let place = |offset: u64, start: u64| usize::try_from(offset.checked_sub(start)?).ok();
-        let (Some(start), Some(end)) = (place(from, self.start), place(to, self.start)) else { return };
-        let (Some(first), true) = (place(from, at), start < end) else { return };
+        let index = |offset: u64, start: u64| usize::try_from(offset.checked_sub(start)?).ok();
+        let (Some(start), Some(end)) = (index(from, self.start), index(to, self.start)) else { return };
+        let (Some(first), true) = (index(from, at), start < end) else { return };
         let Some(bytes) = bytes.get(first..first + (end - start)) else { return };
         if self.bytes.len() < end {
             // Twice as much at a time, so that a run of small pieces is not copied for each.
@@ -61,8 +61,8 @@ impl Run {
             self.bytes.reserve_exact(room - self.bytes.len());
             self.bytes.resize(end, 0);
         }
-        if let Some(place) = self.bytes.get_mut(start..end) {
-            place.copy_from_slice(bytes);
+        if let Some(to) = self.bytes.get_mut(start..end) {
+            to.copy_from_slice(bytes);
         }
         let first = self.there.partition_point(|there| there.end < start);
         let last = self.there.partition_point(|there| there.start <= end);

@@ -82,7 +82,7 @@ impl StreamedScene {
     /// Takes `bytes` that are in the file from `at` on.
     ///
     /// # Errors
-    /// Those of [`LexiFeed::feed`].
+    /// As [`LexiFeed::feed`].
     pub fn feed(&mut self, at: u64, bytes: &[u8]) -> Result<()> {
         self.feed.feed(at, bytes)
     }
@@ -91,7 +91,7 @@ impl StreamedScene {
     /// their numbers. Each is there as soon as its base is. Drops decoded chunks whose bytes were dropped.
     ///
     /// # Errors
-    /// Those of [`LexiFeed::decode`].
+    /// As [`LexiFeed::decode`].
     pub fn refresh(&mut self) -> Result<Vec<usize>> {
         let change = self.drawn.update(&self.feed, usize::MAX);
         self.models.retain(|c, _| change.removed.binary_search(c).is_err());

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::packed::bitstream::LayerForm;
-use crate::packed::decode::place::places;
+use crate::packed::decode::output::chunk_outputs;
 use crate::packed::{PackOptions, Packed, Packer};
 use crate::scene::splats::Geometry;
 use crate::{Sensitivity, Silent};
@@ -45,10 +45,10 @@ fn decoded(
     ranges.iter_mut().enumerate().for_each(|(k, range)| *range = range.filter(|_| there(k)));
     let (mut geometry, mut counts) = (Geometry::zeros(chunk.gaussians), vec![0; chunk.gaussians]);
     let spans = std::slice::from_ref(&(0..chunk.gaussians)).to_vec();
-    let mut place = places(&mut geometry, &mut counts, &spans).pop().unwrap();
+    let mut output = chunk_outputs(&mut geometry, &mut counts, &spans).pop().unwrap();
     let want = Want { sums: true, bits: false };
     let budget = MemoryBudget::new(&packed.head().limits, "test", u64::MAX);
-    let (piece, sums) = of.unpacker.chunk(form, chunk.cell, &[], &ranges, want, &mut place, &budget).ok()?;
+    let (piece, sums) = of.unpacker.chunk(form, chunk.cell, &[], &ranges, want, &mut output, &budget).ok()?;
     Some(Decoded { geometry, counts, piece, sums })
 }
 

@@ -56,7 +56,7 @@ pub struct Coded {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct CodedLayer {
     pub(super) gaussians: usize,
-    /// The place of each Gaussian in the source of its file, if the order is kept.
+    /// The index of each Gaussian in the source of its file, if the order is kept.
     pub(super) order: Option<Vec<u32>>,
     pub(super) extras: Vec<Extra>,
 }
@@ -172,12 +172,12 @@ impl Coding {
         for gaussians in quantised.layer_counts() {
             let own = start..start + gaussians;
             start = own.end;
-            let place = |g: &MortonKey| {
-                let place = u64::from(bucket.places[g.index()].source).saturating_sub(first);
-                u32::try_from(place).unwrap_or(u32::MAX)
+            let source = |g: &MortonKey| {
+                let source = u64::from(bucket.keys[g.index()].source).saturating_sub(first);
+                u32::try_from(source).unwrap_or(u32::MAX)
             };
             let order =
-                options.keep_order.then(|| quantised.sources()[own.clone()].iter().map(place).collect());
+                options.keep_order.then(|| quantised.sources()[own.clone()].iter().map(source).collect());
             layers.push(CodedLayer { gaussians, order, extras: quantised.extras(own) });
         }
         let coded =

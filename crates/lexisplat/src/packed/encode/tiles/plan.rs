@@ -238,7 +238,7 @@ impl Plan {
     /// `progress`.
     ///
     /// # Errors
-    /// Those of [`Survey::of`], and [`Error::Parameter`] if there is no such tile or it is not as it was when it was
+    /// As [`Survey::of`], and [`Error::Parameter`] if there is no such tile or it is not as it was when it was
     /// surveyed.
     pub fn runs(
         &self,
@@ -273,7 +273,7 @@ impl Plan {
     /// [`BucketReader::add_piece`]: super::BucketReader::add_piece
     ///
     /// # Errors
-    /// Those of [`Self::runs`].
+    /// As [`Self::runs`].
     pub fn scatter(
         &self,
         number: usize,
@@ -289,7 +289,7 @@ impl Plan {
             layout.pack(splats, &mut bytes);
             for (key, row) in keys.iter().zip(bytes.chunks_exact(layout.bytes())) {
                 let piece = pieces.entry(buckets.of(*key)).or_default();
-                piece.places.push(*key);
+                piece.keys.push(*key);
                 piece.rows.extend_from_slice(row);
             }
             Ok(())
@@ -387,7 +387,7 @@ impl Buckets<'_> {
 pub(super) struct Piece {
     pub(super) plan_id: u32,
     pub(super) bucket: usize,
-    pub(super) places: Vec<MortonKey>,
+    pub(super) keys: Vec<MortonKey>,
     pub(super) rows: Vec<u8>,
 }
 

@@ -83,7 +83,7 @@ impl Sample {
         splats.retain(&keep);
         splats.shrink_to_fit();
         let taken = || (0..n).filter(|&i| keep[i]);
-        let keys = (0..).zip(taken()).map(|(source, i)| MortonKey { source, ..bucket.places[i] }).collect();
+        let keys = (0..).zip(taken()).map(|(source, i)| MortonKey { source, ..bucket.keys[i] }).collect();
         self.buckets.push(BucketSample {
             number: bucket.number,
             splats,

@@ -40,7 +40,7 @@ impl Survey {
     /// `progress`.
     ///
     /// # Errors
-    /// Those of reading the tile, and [`crate::Error::Cancelled`].
+    /// Errors of reading the tile, and [`crate::Error::Cancelled`].
     pub fn of(
         tile: &dyn SplatSource,
         rows: Range<usize>,

@@ -97,7 +97,7 @@ impl<'a> Naive<'a> {
     }
 
     fn symbol(&mut self, slot: Slot, context: u32) -> u64 {
-        let place = slot.number * CONTEXTS + (context as usize).min(CONTEXTS - 1);
+        let table = slot.number * CONTEXTS + (context as usize).min(CONTEXTS - 1);
         let whole = 1_u64
             << if (Stream::Atom0 as usize..=Stream::Atom2 as usize).contains(&(slot.stream as usize)) {
                 12
@@ -105,8 +105,8 @@ impl<'a> Naive<'a> {
                 10
             };
         let low = self.state % whole;
-        for &symbol in &self.symbols[place] {
-            let interval = self.tables.interval(place, symbol);
+        for &symbol in &self.symbols[table] {
+            let interval = self.tables.interval(table, symbol);
             let (start, share) = (u64::from(interval.start), u64::from(interval.share));
             if (start..start + share).contains(&low) {
                 self.state = share * (self.state / whole) + low - start;
@@ -114,7 +114,7 @@ impl<'a> Naive<'a> {
                 return symbol.into();
             }
         }
-        panic!("no symbol has {low} in context {place}");
+        panic!("no symbol has {low} in context {table}");
     }
 
     fn bits(&mut self, count: u32) -> u64 {

@@ -13,7 +13,7 @@ use crate::support::maths::Vec3;
 
 /// The slices of a scene into which the geometry of a chunk is decoded.
 #[derive(Debug, Default)]
-pub(in crate::packed) struct Place<'a> {
+pub(in crate::packed) struct ChunkOutput<'a> {
     pub(in crate::packed) positions: &'a mut [Vec3],
     pub(in crate::packed) dc: &'a mut [Vec3],
     pub(in crate::packed) opacities: &'a mut [f32],
@@ -23,7 +23,7 @@ pub(in crate::packed) struct Place<'a> {
     pub(in crate::packed) counts: &'a mut [u8],
 }
 
-impl Place<'_> {
+impl ChunkOutput<'_> {
     /// Stores lane `l` of `drawn` as Gaussian `i`; `None` if there is no such Gaussian.
     #[inline(always)]
     pub(in crate::packed) fn put(&mut self, i: usize, drawn: &Drawn, l: usize) -> Option<()> {
@@ -50,13 +50,13 @@ fn take<'a, T>(values: &mut &'a mut [T], count: usize) -> &'a mut [T] {
     values.split_off_mut(..count).unwrap_or_default()
 }
 
-/// Splits a scene into the places of all chunks. `spans` holds the Gaussians of each chunk, one chunk after the other.
-pub(in crate::packed) fn places<'a>(
+/// Splits a scene into the outputs of all chunks. `spans` holds the Gaussians of each chunk, one chunk after the other.
+pub(in crate::packed) fn chunk_outputs<'a>(
     g: &'a mut Geometry,
     counts: &'a mut [u8],
     spans: &[Range<usize>],
-) -> Vec<Place<'a>> {
-    let mut rest = Place {
+) -> Vec<ChunkOutput<'a>> {
+    let mut rest = ChunkOutput {
         positions: &mut g.positions,
         dc: &mut g.dc,
         opacities: &mut g.opacities,
@@ -64,7 +64,7 @@ pub(in crate::packed) fn places<'a>(
         rotations: &mut g.rotations,
         counts,
     };
-    let place = |span: &Range<usize>| Place {
+    let output = |span: &Range<usize>| ChunkOutput {
         positions: take(&mut rest.positions, span.len()),
         dc: take(&mut rest.dc, span.len()),
         opacities: take(&mut rest.opacities, span.len()),
@@ -72,7 +72,7 @@ pub(in crate::packed) fn places<'a>(
         rotations: take(&mut rest.rotations, span.len()),
         counts: take(&mut rest.counts, span.len()),
     };
-    spans.iter().map(place).collect()
+    spans.iter().map(output).collect()
 }
 
 pub(in crate::packed) fn indices(dictionary: &Dictionary, atoms: Vec<u16>) -> Indices {

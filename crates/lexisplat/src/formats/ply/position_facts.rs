@@ -12,7 +12,7 @@ const WORTH: f64 = 0.5;
 
 /// Facts about positions in double precision.
 #[derive(Debug, Default)]
-pub(super) struct Places {
+pub(super) struct PositionFacts {
     /// The largest move of a position by rounding, along an axis.
     error: f64,
     /// The least and the largest coordinate along each axis.
@@ -29,7 +29,7 @@ pub(super) struct Settled {
     pub(super) warnings: Vec<String>,
 }
 
-impl Places {
+impl PositionFacts {
     /// Returns the facts about `rows` without the rows `bad`, which are sorted. One of `stride` rows is in the sample.
     pub(super) fn of(
         rows: Range<usize>,
@@ -38,18 +38,18 @@ impl Places {
         positions: &[f64],
         scales: &[f32],
     ) -> Self {
-        let mut places = Self::default();
+        let mut facts = Self::default();
         let (positions, scales) = (positions.as_chunks::<3>().0, scales.as_chunks::<3>().0);
         for (row, (position, scales)) in rows.zip(positions.iter().zip(scales)) {
             if bad.binary_search(&row).is_ok() {
                 continue;
             }
-            places.see(*position);
+            facts.see(*position);
             if row % stride == 0 {
-                places.sample.push((*position, Rounding::size_of(*scales)));
+                facts.sample.push((*position, Rounding::size_of(*scales)));
             }
         }
-        places
+        facts
     }
 
     fn see(&mut self, position: [f64; 3]) {
@@ -74,7 +74,7 @@ impl Places {
 
     /// Decides on an offset. The result has one only if rounding without it would be coarse.
     pub(super) fn settle(self) -> Settled {
-        let size = Rounding::median(self.sample.iter().map(|place| place.1).collect());
+        let size = Rounding::median(self.sample.iter().map(|sampled| sampled.1).collect());
         let plain = Rounding { error: self.error, size };
         let Some(told) = plain.warning("32-bit floats") else {
             return Settled { offset: None, warnings: Vec::new() };
@@ -100,7 +100,7 @@ impl Places {
     /// hardly change it.
     fn offset(&self) -> Option<Offset> {
         let along = [0, 1, 2].map(|axis| {
-            let mut along: Vec<f64> = self.sample.iter().map(|place| place.0[axis]).collect();
+            let mut along: Vec<f64> = self.sample.iter().map(|sampled| sampled.0[axis]).collect();
             along.sort_unstable_by(f64::total_cmp);
             along
         });
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     /// `count` positions around `centre` in a cube of side 2, and sizes of `size`.
-    fn places(centre: [f64; 3], count: usize, size: f64) -> Places {
+    fn facts(centre: [f64; 3], count: usize, size: f64) -> PositionFacts {
         let positions: Vec<f64> = (0..count)
             .flat_map(|i| {
                 let k = i as f64 / count as f64;
@@ -130,15 +130,15 @@ mod tests {
             .map(|(v, c)| c + v)
             .collect();
         let scale = crate::scene::offset::single(libm::log(size));
-        Places::of(0..count, 2, &[3], &positions, &vec![scale; 3 * count])
+        PositionFacts::of(0..count, 2, &[3], &positions, &vec![scale; 3 * count])
     }
 
     #[test]
     fn only_far_positions_get_an_offset() {
         for centre in [[0.0; 3], [100.0, 0.0, -30.0]] {
-            assert_eq!(places(centre, 500, 0.05).settle(), Settled { offset: None, warnings: Vec::new() });
+            assert_eq!(facts(centre, 500, 0.05).settle(), Settled { offset: None, warnings: Vec::new() });
         }
-        let found = places([500_000.4, 4_649_776.3, 100.0], 500, 0.05).settle();
+        let found = facts([500_000.4, 4_649_776.3, 100.0], 500, 0.05).settle();
         assert_eq!(found.offset, Offset::new([500_000.5, 4_649_776.5, 100.0]).unwrap());
         assert_eq!(found.warnings.len(), 1, "{:?}", found.warnings);
         let said = "32-bit floats move positions by up to 0.25, and the median Gaussian has a size of 0.050; they are \
@@ -149,12 +149,12 @@ mod tests {
     /// If no offset helps, there is a warning.
     #[test]
     fn a_rounding_that_is_left_is_told() {
-        let mut wide = places([0.0; 3], 500, 1e-9);
-        wide.add(Places::of(500..501, 1, &[], &[1e7, 0.0, 0.0], &[0.0; 3]));
+        let mut wide = facts([0.0; 3], 500, 1e-9);
+        wide.add(PositionFacts::of(500..501, 1, &[], &[1e7, 0.0, 0.0], &[0.0; 3]));
         let found = wide.settle();
         assert_eq!((found.offset, found.warnings.len()), (None, 1));
-        let mut far = places([5e8, 0.0, 0.0], 500, 0.01);
-        far.add(Places::of(500..501, 1, &[], &[5.02e8, 0.0, 0.0], &[0.0; 3]));
+        let mut far = facts([5e8, 0.0, 0.0], 500, 0.01);
+        far.add(PositionFacts::of(500..501, 1, &[], &[5.02e8, 0.0, 0.0], &[0.0; 3]));
         let found = far.settle();
         assert!(found.offset.is_some());
         assert!(found.warnings[1].starts_with("relative to the offset, 32-bit floats move"), "{found:?}");
@@ -162,16 +162,16 @@ mod tests {
 
     #[test]
     fn rows_may_come_in_any_pieces() {
-        let whole = places([4e6, 1e6, 4e6], 300, 0.02);
+        let whole = facts([4e6, 1e6, 4e6], 300, 0.02);
         let (positions, sizes): (Vec<_>, Vec<_>) = whole.sample.iter().copied().unzip();
         assert_eq!((positions.len(), sizes.len()), (150, 150));
         let flat = positions.as_flattened();
         let scales = vec![crate::scene::offset::single(libm::log(0.02)); flat.len()];
         let piece = |range: Range<usize>| {
             let values = 3 * range.start..3 * range.end;
-            Places::of(range, 1, &[], &flat[values.clone()], &scales[values])
+            PositionFacts::of(range, 1, &[], &flat[values.clone()], &scales[values])
         };
-        let mut sum = Places::default();
+        let mut sum = PositionFacts::default();
         [0..1, 1..70, 70..150].map(piece).into_iter().for_each(|one| sum.add(one));
         assert_eq!(sum.settle(), piece(0..150).settle());
     }

@@ -11,7 +11,7 @@ const MAX_LINKS: usize = 40;
 
 /// The target of an output.
 #[derive(Debug)]
-pub(super) enum Place {
+pub(super) enum Resolved {
     /// A regular file of this name, which is no link.
     File(PathBuf),
     /// A pipe or device, which is written to directly. A file renamed over `/dev/null` would replace it for every
@@ -20,7 +20,7 @@ pub(super) enum Place {
 }
 
 /// Returns the target of `output`.
-pub(super) fn place(output: &Output<'_>) -> Result<Place> {
+pub(super) fn resolved(output: &Output<'_>) -> Result<Resolved> {
     let path = output.path;
     let refuse = |kind: io::ErrorKind| Err(Error::io(path, kind.into()));
     match std::fs::metadata(path) {
@@ -28,9 +28,9 @@ pub(super) fn place(output: &Output<'_>) -> Result<Place> {
         Ok(found) if is_disk(&found) => {
             Err(Error::parameter("output", path.display(), "a file, not a block device"))
         }
-        Ok(found) if !found.is_file() => Ok(Place::Special),
+        Ok(found) if !found.is_file() => Ok(Resolved::Special),
         Ok(_) if output.existing == Existing::Refuse => refuse(io::ErrorKind::AlreadyExists),
-        _ => Ok(Place::File(followed(path).map_err(|e| Error::io(path, e))?)),
+        _ => Ok(Resolved::File(followed(path).map_err(|e| Error::io(path, e))?)),
     }
 }
 

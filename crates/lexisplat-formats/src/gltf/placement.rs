@@ -1,4 +1,4 @@
-//! The place of a primitive's splats along the axes of a trainer's PLY.
+//! The placement of a primitive's splats along the axes of a trainer's PLY.
 
 use lexisplat::{Error, Offset, Result, ShDegree};
 
@@ -17,7 +17,7 @@ const SIGN_SLACK: f64 = 1e-9;
 
 /// Changes that put splats along the axes of a trainer's PLY. They are made in the order of the fields.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct Placement {
     flip: Flip,
     /// Quaternion (w, x, y, z) of length 1.
     turn: Option<[f64; 4]>,
@@ -26,8 +26,8 @@ pub(super) struct Place {
     pub(super) is_mirrored: bool,
 }
 
-impl Place {
-    /// Returns the place of the splats of node `node`, which `matrix` puts into the scene. The axes in `changes` have
+impl Placement {
+    /// Returns the placement of the splats of node `node`, which `matrix` puts into the scene. The axes in `changes` have
     /// signs that differ from those of the glTF.
     ///
     /// # Errors
@@ -71,18 +71,18 @@ impl Place {
         Ok(Self { flip, turn: Some(quaternion([x, y, z])), scale, translation, is_mirrored })
     }
 
-    /// Returns the place of the origin of the splats.
+    /// Returns the position of the origin of the splats.
     pub(super) fn translation(&self) -> [f64; 3] {
         self.translation
     }
 
-    /// Makes the place relative to `offset`.
+    /// Makes the placement relative to `offset`.
     pub(super) fn rebase(&mut self, offset: Offset) {
         let numbers = offset.get();
         self.translation = [0, 1, 2].map(|k| self.translation[k] - numbers[k]);
     }
 
-    /// Puts the splats of `out`, of `degree`, in their place.
+    /// Applies the placement to the splats of `out`, of `degree`.
     #[expect(clippy::cast_possible_truncation, reason = "scenes are in single precision")]
     #[expect(clippy::float_cmp, reason = "only exactly 1 and 0 change nothing")]
     pub(super) fn apply(&self, degree: ShDegree, out: RowsMut<'_>) {

@@ -6,7 +6,7 @@ use std::process::Command;
 use super::runs::{JOBS, OLD, OUTPUT, program, ready};
 use crate::folder::Folder;
 
-/// Returns a folder with a PLY that cannot be read. What is refused before it is read is refused for its output.
+/// Returns a folder with a PLY that cannot be read. An error before the PLY is read is one of the output.
 fn unread() -> Folder {
     let folder = Folder::new();
     std::fs::write(folder.path("bad"), "nonsense").unwrap();
