@@ -31,9 +31,9 @@ const SHARES: [f64; 2] = [0.01, 0.6];
 /// reach. Views through haze have less.
 const LEAST_DETAIL: f64 = 0.7;
 const DETAILED: f64 = 0.15;
-/// Range of the sine of the angle by which generated views look up: 58 degrees down to 20 degrees up. Few photographs are taken
+/// Range of the sine of the angle by which generated views look up: 58 degrees down to 6 degrees up. Few photographs are taken
 /// from below or straight from above.
-const LOOKS_UP: std::ops::RangeInclusive<f64> = -0.85..=0.35;
+const LOOKS_UP: std::ops::RangeInclusive<f64> = -0.85..=0.1;
 /// Share of the picture, from its middle, in which the subject counts as in the picture.
 const WITHIN: f32 = 0.9;
 /// Radius around the subject's centre, as a share of the subject's radius, within which Gaussians belong to it.
