@@ -28,6 +28,8 @@ export async function serveStub(more = {}) {
     '/made': made,
     '/wasm/viewer.js': here('../stub/viewer.js'),
     '/wasm/viewer_bg.wasm': join(made, 'empty.wasm'),
+    '/wasm/processor_bg.wasm': join(made, 'empty.wasm'),
+    '/src/processor-worker.js': here('../stub/processor-worker.js'),
     '/src/session.js': here('../stub/session.js'),
     ...more,
   });
