@@ -33,7 +33,7 @@ const BUILDS = {
   decoder: { features: ['feed'], optimise: ['-O3', '-Oz'] },
   files: { features: ['files'], optimise: ['-Oz'] },
   // In the viewer this crate makes pictures on the GPU, and is small. Here it draws them itself.
-  processor: { features: ['processor'], optimise: ['-O3'], cargo: ['--config', 'profile.wasm.package.lexisplat-render.opt-level=3'] },
+  processor: { features: ['processor'], optimise: ['-O3'], cargo: ['--config', 'profile.wasm.package.lexisplat-render.opt-level=2'] },
   viewer: { features: ['viewer'], optimise: ['-Oz'] },
 };
 

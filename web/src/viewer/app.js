@@ -268,9 +268,7 @@ export class App {
     const missing = obstacle();
     if (missing) return this.#cannot(missing);
     try {
-      const { Viewer } = await loadEngine(this.options.place);
-      if (signal.aborted) return false;
-      await this.stage.start(Viewer, this.#renderer());
+      await this.stage.start(this.#renderer());
       this.#begin();
       if (this.#wanted.words) await this.run(this.#wanted.words);
     } catch (error) {
@@ -282,7 +280,7 @@ export class App {
   // A GPU that is lost again and again is not asked any more.
   #renderer() {
     const { place, renderer } = this.options;
-    return { processor: place.processor, forced: renderer === 'processor' || this.#losses > MOST_LOSSES };
+    return { place, forced: renderer === 'processor' || this.#losses > MOST_LOSSES };
   }
 
   // What depends on who draws.
@@ -297,8 +295,7 @@ export class App {
     const link = await this.link();
     const sources = this.loads.slots.map((load) => load?.source);
     for (const slot of [0, 1]) this.loads.remove(slot);
-    const { Viewer } = await loadEngine(this.options.place);
-    await this.stage.restart(Viewer, this.#renderer());
+    await this.stage.restart(this.#renderer());
     this.#begin();
     this.#wanted = { words: '', link, slots: new Set() };
     sources.forEach((source, slot) => source && this.open(source, slot));

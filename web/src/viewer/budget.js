@@ -4,7 +4,7 @@
 // bytes (docs/results/lod.md), and take about 90 MB on the GPU.
 const DESKTOP = { splats: 3_000_000, bytes: 128 * 2 ** 20 };
 const PHONE = { splats: 1_000_000, bytes: 32 * 2 ** 20 };
-// The same where the processor draws: a picture at rest of as many Gaussians takes about a second (docs/results/web.md).
+// The same where the processor draws. A picture of as many Gaussians took some tenths of a second (docs/results/web.md).
 const PROCESSOR = { splats: 300_000, bytes: 32 * 2 ** 20 };
 
 /**

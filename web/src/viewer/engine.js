@@ -60,18 +60,25 @@ async function start(place) {
 
 /**
  * Makes a viewer that draws by WebGPU, or else on the processor. Rejects with the reasons if it can have neither.
- * @param {any} Viewer
  * @param {object} options
+ * @param {Place} options.place
  * @param {HTMLCanvasElement} options.canvas
- * @param {Processor} [options.processor]
  * @param {boolean} [options.forced] whether the processor draws in any case
  * @param {() => void} [options.lost] is told that the GPU was lost, and with it all scenes
  * @returns {Promise<{viewer: any, painter?: import('./painter.js').Painter, why: string}>} why: what is wrong with WebGPU here
  */
-export async function openViewer(Viewer, { canvas, processor, forced = false, lost }) {
+export async function openViewer({ place, canvas, forced = false, lost }) {
   const options = JSON.stringify({});
+  const paint = async () => (await import('./painter.js')).Painter.open(place.processor, canvas);
   let why = forced ? '' : withoutGpu();
-  if (why === undefined) {
+  // Both programs come at the same time where both are needed.
+  const early = why === undefined ? undefined : paint();
+  early?.catch(() => {});
+  const { Viewer } = await load(place).catch((error) => {
+    early?.then((painter) => painter.close(), () => {});
+    throw error;
+  });
+  if (!early) {
     try {
       const viewer = await Viewer.create(canvas, options);
       viewer.device()?.lost.then(lost);
@@ -81,8 +88,7 @@ export async function openViewer(Viewer, { canvas, processor, forced = false, lo
     }
   }
   try {
-    const { Painter } = await import('./painter.js');
-    const painter = await Painter.open(processor, canvas);
+    const painter = await (early ?? paint());
     return { viewer: painter.serve(Viewer.on_processor(options)), painter, why };
   } catch (error) {
     throw new Error([why, reason(error)].filter(Boolean).join(' '), { cause: error });

@@ -46,11 +46,10 @@ export class Stage {
 
   /**
    * Creates the viewer. Rejects with the reason where this browser cannot draw.
-   * @param {any} Viewer
-   * @param {{processor?: import('./engine.js').Processor, forced?: boolean}} options of `openViewer`
+   * @param {{place: import('./engine.js').Place, forced?: boolean}} options of `openViewer`
    */
-  async start(Viewer, options) {
-    await this.#open(Viewer, options);
+  async start(options) {
+    await this.#open(options);
     if (this.#closed) return this.#proceed();
     this.#observer = new ResizeObserver((entries) => this.#resize(entries[entries.length - 1]));
     this.#observe();
@@ -58,18 +57,18 @@ export class Stage {
   }
 
   /** Creates another viewer in place of the one whose GPU was lost. Rejects with the reason where there is none to be had. */
-  async restart(Viewer, options) {
+  async restart(options) {
     await this.act((viewer) => {
       viewer.free?.();
       this.#viewer = undefined;
-      return this.#open(Viewer, options);
+      return this.#open(options);
     });
     // It tells the new viewer the size at once.
     this.#observer?.disconnect();
     this.#observe();
   }
 
-  async #open(Viewer, options) {
+  async #open(options) {
     this.#lost = false;
     const opened = {};
     const lost = () => {
@@ -77,7 +76,7 @@ export class Stage {
       this.#lost = true;
       this.on.lost();
     };
-    Object.assign(opened, await openViewer(Viewer, { canvas: this.canvas, lost, ...options }));
+    Object.assign(opened, await openViewer({ canvas: this.canvas, lost, ...options }));
     [this.#viewer, this.#painter, this.why] = [opened.viewer, opened.painter, opened.why];
     if (this.#painter) this.#scale = COARSEST;
   }

@@ -63,11 +63,11 @@ export async function newPage(browser, options = {}) {
 /**
  * Gives a function that defines tests, which fail if the page that `opened` gives had faults, and closes the page.
  * @param {() => import('playwright-core').Page | undefined} opened
- * @param {object} [options] of every test
+ * @param {object} [options] of every test; a test may have more of its own
  */
 export function faultless(opened, options = {}) {
-  return (name, run) =>
-    it(name, options, async () => {
+  return (name, run, own = {}) =>
+    it(name, { ...options, ...own }, async () => {
       try {
         await run();
         assert.deepEqual(opened().faults, []);
