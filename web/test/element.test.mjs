@@ -273,13 +273,18 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
     for (const init of [() => delete Navigator.prototype.gpu, () => Object.defineProperty(globalThis, 'noAdapter', { value: 'no adapter is to be had' })]) {
       await page?.context().close();
       await writeFile(join(server.made, 'host.html'), HOST('<lexi-viewer src="/made/first.lexi"></lexi-viewer>'));
-      page = await newPage(browser);
+      page = await newPage(browser, { reducedMotion: 'no-preference' });
       await page.addInitScript(init);
       await page.goto(`${server.url}/made/host.html`);
       await loaded();
       assert.equal(await page.evaluate(() => document.querySelector('lexi-viewer').report.renderer), 'processor');
       assert.match(await page.getByText('Drawn by the processor').getAttribute('title'), /^This browser has no WebGPU\.|^no adapter is to be had\.$/);
       assert.deepEqual(await heard('error'), []);
+      const turns = (most) => page.waitForFunction((most) => globalThis.viewers[0].calls.filter(([name]) => name === 'orbit').length > most, most);
+      await page.waitForTimeout(150);
+      assert.equal(await page.evaluate(() => globalThis.viewers[0].calls.filter(([name]) => name === 'orbit').length), 0, 'it does not turn by itself');
+      await page.getByRole('button', { name: 'Turn', exact: true }).click();
+      await turns(2);
     }
   });
 

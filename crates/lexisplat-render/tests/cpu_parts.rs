@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::gpu_parts::{dense_run, joined, sparse, sparse_run};
+use crate::gpu_parts::{dense_run, sparse, sparse_run};
 use crate::made;
 use lexisplat::ShDegree;
 use lexisplat_render::gpu::{SceneForm, ScenePart};
@@ -84,7 +84,7 @@ fn dense_parts_have_the_picture_of_the_whole() {
 fn sparse_parts_have_the_picture_of_the_whole() {
     let all = sparse(6, 3000);
     for escapes in [true, false] {
-        let model = joined(&all, &[0..3000], escapes);
+        let model = sparse_run(&all, 0..3000, escapes);
         let run = |range| ScenePart::new(&Scene::from(&sparse_run(&all, range, escapes))).unwrap().to_bytes();
         check(&SceneForm::of(&Scene::from(&all)), run, &Scene::from(&model));
     }

@@ -139,7 +139,7 @@ fn dense_parts_draw_the_picture_of_the_whole() {
 }
 
 /// The Gaussians of several runs of a compressed scene.
-pub(crate) fn joined(all: &Model, runs: &[Range<usize>], escapes: bool) -> Model {
+fn joined(all: &Model, runs: &[Range<usize>], escapes: bool) -> Model {
     let (mut geometry, mut counts, mut exact) = (Geometry::default(), Vec::new(), Escapes::default());
     let (mut indices, mut values) = (Vec::new(), Vec::new());
     for run in runs {

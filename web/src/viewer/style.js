@@ -45,7 +45,7 @@ canvas:focus-visible { outline-offset: -3px; }
 .view:has(~ .panel) .label.right { right: 312px; }
 .label.score { bottom: 12px; left: 12px; }
 .drawn {
-  position: absolute; left: 4px; bottom: 1px; padding: 0 4px; border-radius: 4px; background: rgb(12 12 14 / 0.5); color: #fff; font-size: 10px; line-height: 13px;
+  position: absolute; left: 4px; bottom: 1px; padding: 0 4px; border-radius: 4px; background: rgb(12 12 14 / 0.68); color: #fff; font-size: 10px; line-height: 13px;
   pointer-events: auto;
 }
 .app:not(.shown) .drawn { display: none; }
