@@ -1,4 +1,4 @@
-// Makes the viewer's page of one file: HTML, style, program, worker and WebAssembly, for any server and from disk.
+// Makes the viewer's page of one file: HTML, style, program, workers and WebAssembly, for any server and from disk.
 //
 //   node build-page.mjs [--out FILE]        writes FILE, or ../crates/lexisplat-cli/assets/viewer.html.gz; gzipped if it ends so
 //
@@ -15,7 +15,7 @@ import { gzipSync } from 'node:zlib';
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
 const OUT = here('../crates/lexisplat-cli/assets/viewer.html.gz');
-// The newest JavaScript that all browsers with WebGPU understand.
+// JavaScript that all browsers with WebGPU understand, and all with vectors in WebAssembly that are not old.
 const TARGET = 'es2022';
 // Each is in the page once, so that a scene can be put in by replacing text.
 const MARKERS = [
@@ -33,21 +33,34 @@ const MARKERS = [
  * @param {object} [options]
  * @param {string} [options.wasm] file of the compiled viewer
  * @param {string} [options.worker] script of the workers that decode
+ * @param {string} [options.processor] file of the compiled renderer for browsers without WebGPU
+ * @param {string} [options.processorWorker] script of the worker that draws there
  * @param {Record<string, string>} [options.instead] files to take instead of others, for tests
  * @returns {Promise<string>} the HTML
  */
-export async function buildPage({ wasm = here('wasm/viewer_bg.wasm'), worker = here('src/viewer-worker.js'), instead = {} } = {}) {
-  const [page, program, main, decoder] = await Promise.all([
+export async function buildPage({
+  wasm = here('wasm/viewer_bg.wasm'),
+  worker = here('src/viewer-worker.js'),
+  processor = here('wasm/processor_bg.wasm'),
+  processorWorker = here('src/processor-worker.js'),
+  instead = {},
+} = {}) {
+  const packed = async (file) => gzipSync(await readFile(file), { level: 9 }).toString('base64');
+  const [page, program, renderer, main, decoder, drawer] = await Promise.all([
     readFile(here('src/viewer/page.html'), 'utf8'),
-    readFile(wasm),
+    packed(wasm),
+    packed(processor),
     bundle(here('src/viewer/single.js'), instead),
     bundle(worker, instead),
+    bundle(processorWorker, instead),
   ]);
   const hash = createHash('sha256').update(main).digest('base64');
   const policy = `default-src 'none'; script-src 'sha256-${hash}' 'wasm-unsafe-eval'; worker-src blob:; connect-src * blob: data:; img-src blob: data:; base-uri 'none'; form-action 'none'`;
   const inline = [
-    `<script type="application/gzip" id="program">${gzipSync(program, { level: 9 }).toString('base64')}</script>`,
+    `<script type="application/gzip" id="program">${program}</script>`,
+    `<script type="application/gzip" id="processor">${renderer}</script>`,
     `<script type="text/plain" id="worker">${decoder}</script>`,
+    `<script type="text/plain" id="processor-worker">${drawer}</script>`,
     `<script>${main}</script>`,
   ].join('\n');
 

@@ -1,5 +1,5 @@
 /**
- * Builds the WebAssembly of the npm package: `node build.mjs [decoder] [files] [viewer]`, all without arguments.
+ * Builds the WebAssembly of the npm package: `node build.mjs [decoder] [files] [processor] [viewer]`, all without arguments.
  *
  * It needs the Rust toolchain with the target wasm32-unknown-unknown. With the npm package `binaryen` in node_modules, or in
  * the folder that LEXISPLAT_NPM names, the result is optimised further.
@@ -26,12 +26,14 @@ const COMMENTS = /^ *\/\*\*[^]*?\*\/\n/gm;
 const MOST_DECODER = 150_000;
 
 /**
- * The builds, their features of the crate, and what wasm-opt does: `decoder` decodes packed files, `files` other
- * .lexi files, and `viewer` is what the viewer is made of.
+ * The builds, their features of the crate, what wasm-opt does, and what cargo is told besides: `decoder` decodes packed files,
+ * `files` other .lexi files, `viewer` is what the viewer is made of, and `processor` draws where there is no WebGPU.
  */
 const BUILDS = {
   decoder: { features: ['feed'], optimise: ['-O3', '-Oz'] },
   files: { features: ['files'], optimise: ['-Oz'] },
+  // In the viewer this crate makes pictures on the GPU, and is small. Here it draws them itself.
+  processor: { features: ['processor'], optimise: ['-O3'], cargo: ['--config', 'profile.wasm.package.lexisplat-render.opt-level=2'] },
   viewer: { features: ['viewer'], optimise: ['-Oz'] },
 };
 
@@ -44,10 +46,10 @@ function run(program, args, env = {}) {
 }
 
 function build(name) {
-  const { features, optimise } = BUILDS[name];
+  const { features, optimise, cargo: more = [] } = BUILDS[name];
   const cargo = ['build', '--locked', '--profile', 'wasm', '--target', 'wasm32-unknown-unknown', '-p', 'lexisplat-web', '--lib'];
   cargo.push('--manifest-path', join(root, 'Cargo.toml'), '--target-dir', target, '--no-default-features');
-  cargo.push('--features', features.join(','));
+  cargo.push('--features', features.join(','), ...more);
   run('cargo', cargo, { RUSTFLAGS: FEATURES });
   const built = join(target, 'wasm32-unknown-unknown/wasm/lexisplat_web.wasm');
   const folder = join(web, 'wasm');

@@ -11,14 +11,14 @@ import { sourceOf, watched } from './source.js';
 import { Stream } from './stream.js';
 import { viewerHandlerOf } from './viewer-handler.js';
 
-/** Bytes of a Gaussian on the GPU, besides its nonzeros: position and size, shape, base colour, and its index among codes. */
+/** Bytes of a Gaussian that is drawn, besides its nonzeros: position and size, shape, base colour, and its index among codes. */
 const GEOMETRY = 16 + 32 + 12 + 2;
 /** Bytes of a nonzero, and how many a Gaussian has at most on average in files that were met. */
 const NONZERO = 3;
 const NONZEROS = 8;
 /** Bytes of a coefficient of dense SH, whose rows are filled up to four. */
 const COEFFICIENT = 4;
-/** Of the graphics memory, the share that the scene may take. The rest is for what it is drawn with. */
+/** Of the memory for a scene and its drawing, the share that the scene may take. The rest is for what it is drawn with. */
 const SCENE_SHARE = 0.75;
 /** No limit of what is drawn of a scene. */
 const UNLIMITED = { splats: Infinity, bytes: Infinity };
@@ -37,7 +37,7 @@ const UNLIMITED = { splats: Infinity, bytes: Infinity };
  * @param {AbortSignal} [options.signal]
  * @param {import('./stream.js').Budget} [options.budget] most Gaussians that are drawn, and bytes of a .lexi that are held. Of a
  *     packed file with more Gaussians, only what a view shows is drawn.
- * @param {number} [options.memory] most bytes on the GPU
+ * @param {number} [options.memory] most bytes that the scene and its drawing may take
  * @returns {Promise<{info: object}>}
  */
 export async function show(source, { env, onProgress, signal, budget = UNLIMITED, memory = Infinity, ...on }) {
@@ -136,7 +136,7 @@ async function whole({ input: { source }, start, pool, options, memory, onForm, 
       info = { ...head, name, shown: head.gaussians, view: start.view };
       const needed = head.gaussians * (GEOMETRY + COEFFICIENT * 4 * Math.ceil((3 * (head.degree + 1) ** 2) / 4));
       if (needed > memory * SCENE_SHARE) {
-        throw new Error(`${name}: it takes ${needed} bytes of graphics memory as it is, and ${memory} are allowed; a .lexi made of it takes less`);
+        throw new Error(`${name}: it takes ${needed} bytes of memory as it is, and ${memory} are allowed; a .lexi made of it takes less`);
       }
       take(() => onForm(form, info));
     } else {

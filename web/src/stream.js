@@ -13,6 +13,13 @@ const PAUSE = 200;
  * @property {number} bytes most bytes of the file that are held
  */
 
+/** A promise and what settles it. `Promise.withResolvers` is younger than the browsers that the processor draws for. */
+function promised() {
+  const made = {};
+  made.promise = new Promise((resolve, reject) => Object.assign(made, { resolve, reject }));
+  return made;
+}
+
 export class Stream {
   /** Resolves when all that the first view shows is drawn. Rejects if that fails. */
   whole;
@@ -35,9 +42,9 @@ export class Stream {
   #requests = 0;
   #isChanging = false;
   #failure;
-  #woken = Promise.withResolvers();
-  #first = Promise.withResolvers();
-  #settled = Promise.withResolvers();
+  #woken = promised();
+  #first = promised();
+  #settled = promised();
 
   /**
    * @param {object} input
@@ -109,10 +116,10 @@ export class Stream {
           this.isWhole = true;
           this.#first.resolve();
           this.#settled.resolve();
-          this.#settled = Promise.withResolvers();
+          this.#settled = promised();
         }
         await this.#woken.promise;
-        this.#woken = Promise.withResolvers();
+        this.#woken = promised();
       }
     } catch (error) {
       for (const { promise, reject } of [this.#first, this.#settled]) {

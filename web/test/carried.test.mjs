@@ -102,7 +102,7 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
         return shown;
       };
       const view = await picture();
-      const still = await picture(() => delete Navigator.prototype.gpu);
+      const still = await picture(() => delete globalThis.WebAssembly);
       // The still picture covers 16 by 9 whose shorter side is that of the window. Beside it there is nothing.
       const short = Math.min(width, height);
       const edge = [(width - (short * 16) / 9) / 2, (height - short) / 2].map((side) => Math.max(0, Math.ceil(side)) + MOVED);

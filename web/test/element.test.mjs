@@ -269,12 +269,63 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
     assert.deepEqual(await heard('error'), []);
   });
 
-  test('without WebGPU says so at once and shows its poster', async () => {
+  test('without WebGPU draws on the processor, in the end', async () => {
+    for (const init of [() => delete Navigator.prototype.gpu, () => Object.defineProperty(globalThis, 'noAdapter', { value: 'no adapter is to be had' })]) {
+      await page?.context().close();
+      await writeFile(join(server.made, 'host.html'), HOST('<lexi-viewer src="/made/first.lexi"></lexi-viewer>'));
+      page = await newPage(browser, { reducedMotion: 'no-preference' });
+      await page.addInitScript(init);
+      await page.goto(`${server.url}/made/host.html`);
+      await loaded();
+      assert.equal(await page.evaluate(() => document.querySelector('lexi-viewer').report.renderer), 'processor');
+      assert.match(await page.getByText('Drawn by the processor').getAttribute('title'), /^This browser has no WebGPU\.|^no adapter is to be had\.$/);
+      assert.deepEqual(await heard('error'), []);
+      const turns = (most) => page.waitForFunction((most) => globalThis.viewers[0].calls.filter(([name]) => name === 'orbit').length > most, most);
+      await page.waitForTimeout(150);
+      assert.equal(await page.evaluate(() => globalThis.viewers[0].calls.filter(([name]) => name === 'orbit').length), 0, 'it does not turn by itself');
+      await page.getByRole('button', { name: 'Turn', exact: true }).click();
+      await turns(2);
+    }
+  });
+
+  test('draws on the processor where it is asked to', async () => {
+    await open('<lexi-viewer src="/made/first.lexi" controls="none" renderer="processor"></lexi-viewer>');
+    await loaded();
+    const renderer = () => page.evaluate(() => document.querySelector('lexi-viewer').report.renderer);
+    assert.equal(await renderer(), 'processor');
+    assert.equal(await page.getByText('Drawn by the processor').isVisible(), false, 'no words were asked for');
+    await page.evaluate(() => (document.querySelector('lexi-viewer').renderer = ''));
+    await loaded(2);
+    assert.equal(await renderer(), 'webgpu');
+    assert.deepEqual(await viewers(), [true, false]);
+  });
+
+  test('loads its scene again when the GPU is lost, and draws on the processor when it is lost for good', async () => {
+    await open('<lexi-viewer src="/made/first.lexi"></lexi-viewer>');
+    await loaded();
+    await page.evaluate(() => document.querySelector('lexi-viewer').run('orbit=30:10'));
+    const link = await page.evaluate(() => document.querySelector('lexi-viewer').link());
+    const state = () =>
+      page.evaluate(async () => {
+        const viewer = document.querySelector('lexi-viewer');
+        return [viewer.report.renderer, viewer.report.models[0].name, await viewer.link()];
+      });
+    for (const [times, renderer] of [[2, 'webgpu'], [3, 'processor']]) {
+      await page.evaluate(() => globalThis.viewers.at(-1).lose());
+      await loaded(times);
+      await page.waitForFunction((link) => globalThis.viewers.at(-1).calls.some(([name, text]) => name === 'set_link' && text === link), link);
+      assert.deepEqual(await state(), [renderer, 'first.lexi', link]);
+    }
+    assert.deepEqual(await viewers(), [true, true, false]);
+    assert.deepEqual(await heard('error'), []);
+  });
+
+  test('says at once that it can draw by nothing, and shows its poster', async () => {
     await writeFile(join(server.made, 'host.html'), HOST(`<lexi-viewer src="/made/first.lexi" poster="${STILL}"></lexi-viewer>`));
     page = await newPage(browser);
-    await page.addInitScript(() => delete Navigator.prototype.gpu);
+    await page.addInitScript(() => delete globalThis.WebAssembly);
     await page.goto(`${server.url}/made/host.html`);
-    await page.getByText('This browser has no WebGPU').waitFor();
+    await page.getByText('This browser has no WebAssembly with SIMD').waitFor();
     assert.equal(await page.locator('.poster').isVisible(), true);
     assert.equal((await heard('error')).length, 1);
   });
@@ -290,6 +341,6 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
 describe('the module of <lexi-viewer>', () => {
   it('can be loaded where there is no browser', async () => {
     const { LexiViewer } = await import('../src/viewer/element.js');
-    assert.deepEqual(LexiViewer.observedAttributes, ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still', 'budget', 'budget-bytes']);
+    assert.deepEqual(LexiViewer.observedAttributes, ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still', 'budget', 'budget-bytes', 'renderer']);
   });
 });

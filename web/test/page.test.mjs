@@ -5,7 +5,7 @@ import { readFile } from 'node:fs/promises';
 import { createServer } from 'node:http';
 import { join } from 'node:path';
 import { after, before, describe } from 'node:test';
-import { launch, npm } from './support/chromium.mjs';
+import { launch, npm, shot } from './support/chromium.mjs';
 import { decodePng } from './support/png.mjs';
 import { calls, drop, faultless, newPage, reportOf, scene, serveStub, whole } from './support/viewer-page.mjs';
 
@@ -336,9 +336,58 @@ describe('the page of the viewer', { skip: !npm && 'LEXISPLAT_NPM is not set' },
     page.faults.length = 0;
   });
 
-  test('without WebGPU says so, with a still picture if there is one', async () => {
+  test('without WebGPU draws on the processor, and says so', async () => {
     page = await newPage(browser);
-    await page.addInitScript(() => delete Navigator.prototype.gpu);
+    await page.addInitScript(() => {
+      delete Navigator.prototype.gpu;
+      globalThis.cost = 300;
+    });
+    await page.goto(`${server.page}?url=/made/first.lexi`);
+    await whole(page, 'first.lexi');
+    const note = page.getByText('Drawn by the processor');
+    await note.waitFor();
+    assert.equal(await note.getAttribute('title'), 'This browser has no WebGPU.');
+    assert.equal((await reportOf(page)).renderer, 'processor');
+    assert.equal(await page.locator('canvas.picture').isVisible(), true);
+    await page.locator('canvas[aria-busy=false]').waitFor();
+    const draws = () => page.evaluate(() => globalThis.viewers.at(-1).draws);
+    assert.equal((await draws()).at(-1), 1);
+    const move = async (from) => {
+      await page.mouse.move(from, 300);
+      await page.mouse.down();
+      await page.mouse.move(from + 30, 310, { steps: 3 });
+      await page.mouse.up();
+    };
+    await move(300);
+    await page.waitForFunction(() => globalThis.viewers.at(-1).draws.some((scale) => scale <= 0.5));
+    await page.locator('canvas[aria-busy=false]').waitFor();
+    assert.equal((await draws()).at(-1), 1, 'at rest it is drawn in full');
+    // A picture in full does not keep one who moves waiting; this one would never be whole.
+    const still = (await draws()).length;
+    await page.getByLabel('Colour behind the scene').fill('#ff0000');
+    await page.waitForFunction((still) => globalThis.viewers.at(-1).draws.length > still, still);
+    const before = (await draws()).length;
+    await move(320);
+    await page.waitForFunction((before) => globalThis.viewers.at(-1).draws.slice(before).some((scale) => scale <= 0.5), before);
+    await page.getByRole('button', { name: 'Black' }).click();
+    await move(320);
+    await page.locator('canvas[aria-busy=false]').waitFor();
+    assert.equal((await draws()).at(-1), 1);
+    const [red, green] = (({ data }) => data.slice(4 * 900 * 200 + 2000))(await shot(page, '.view'));
+    assert.ok(Math.abs(red - 200) < 2 && Math.abs(green - 200) < 2, `${red} ${green}: the picture of the worker is shown`);
+  });
+
+  test('draws on the processor where the address asks for it', async () => {
+    page = await newPage(browser);
+    await page.goto(`${server.page}?url=/made/first.lexi&renderer=processor`);
+    await whole(page, 'first.lexi');
+    assert.equal((await reportOf(page)).renderer, 'processor');
+    assert.equal(await page.getByText('Drawn by the processor').getAttribute('title'), '');
+  });
+
+  test('without WebGPU and WebAssembly says so, with a still picture if there is one', async () => {
+    page = await newPage(browser);
+    await page.addInitScript(() => delete globalThis.WebAssembly);
     const still = 'data:image/gif;base64,R0lGODlhAQABAIAAAP///wAAACwAAAAAAQABAAACAkQBADs=';
     await page.route(/page\.html/, async (route) => {
       const answer = await route.fetch();
@@ -346,15 +395,15 @@ describe('the page of the viewer', { skip: !npm && 'LEXISPLAT_NPM is not set' },
       await route.fulfill({ response: answer, body });
     });
     await page.goto(`${server.page}?url=/made/first.lexi`);
-    await page.getByText('This browser has no WebGPU').waitFor();
+    await page.getByText('This browser has no WebAssembly with SIMD').waitFor();
     assert.equal(await page.locator('.poster').isVisible(), true);
     assert.equal(await page.locator('.poster').getAttribute('src'), still);
     await drop(page, 'body', [file('one.lexi')]);
-    assert.equal(await page.locator('canvas').isVisible(), false);
+    assert.equal(await page.locator('canvas').isVisible(), false, 'there is one canvas, and it is not shown');
     assert.equal(await page.locator('.panel').isVisible(), false, 'nothing can be done there');
   });
 
-  test('without an adapter says the reason', async () => {
+  test('without an adapter and without the processor says the reason', async () => {
     page = await newPage(browser);
     await page.addInitScript(() => {
       Object.defineProperty(globalThis, 'viewers', { set: () => {}, get: () => ({ push: () => { throw 'no GPU is to be had'; } }) });

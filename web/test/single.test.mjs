@@ -26,6 +26,8 @@ describe('the page of one file', { skip: !npm && 'LEXISPLAT_NPM is not set' }, (
     const options = {
       wasm: join(folder, 'empty.wasm'),
       worker: here('stub/worker.js'),
+      processor: join(folder, 'empty.wasm'),
+      processorWorker: here('stub/processor-worker.js'),
       instead: { [here('../wasm/viewer.js')]: here('stub/viewer.js'), [here('../src/session.js')]: here('stub/session.js') },
     };
     [browser, html] = await Promise.all([launch(), buildPage(options)]);
@@ -92,10 +94,17 @@ describe('the page of one file', { skip: !npm && 'LEXISPLAT_NPM is not set' }, (
     await page.locator('.message', { hasText: 'broken.lexi' }).waitFor();
   });
 
-  test('without WebGPU says so and shows its still picture', async () => {
-    const init = () => delete Navigator.prototype.gpu;
+  test('without WebGPU draws on the processor', async () => {
+    await open([carried('scene', 'garden.lexi')], { init: () => delete Navigator.prototype.gpu });
+    await whole(page, 'garden.lexi');
+    assert.equal((await reportOf(page)).renderer, 'processor');
+    assert.ok(page.asked.every((url) => /^(file|blob|data):/.test(url)), page.asked.join('\n'));
+  });
+
+  test('without WebGPU and WebAssembly says so and shows its still picture', async () => {
+    const init = () => delete globalThis.WebAssembly;
     await open([carried('scene', 'garden.lexi'), ['data-poster=""', `data-poster="${STILL}"`]], { init });
-    await page.getByText('This browser has no WebGPU').waitFor();
+    await page.getByText('This browser has no WebAssembly with SIMD').waitFor();
     assert.equal(await page.locator('.poster').isVisible(), true);
   });
 

@@ -133,13 +133,31 @@ describe('the viewer with WebGPU', { skip: missing }, () => {
     }
   });
 
-  test('the element draws', async () => {
-    await writeFile(join(folder, 'host.html'), `<!doctype html><title>host</title><script type="module" src="/src/viewer/element.js"></script><lexi-viewer src="/golden/${SCENE}"></lexi-viewer>`);
-    await open(`${server.url}/made/host.html`);
+  test('the element draws, and goes on on the processor when the GPU is lost for good', async () => {
+    await writeFile(join(folder, 'host.html'), `<!doctype html><title>host</title><script type="module" src="/src/viewer/element.js"></script><lexi-viewer src="/golden/${SCENE}" controls="none"></lexi-viewer>`);
+    page = await newPage(browser, { viewport: SIZE });
+    page.setDefaultTimeout(PATIENCE);
+    await page.addInitScript(() => {
+      const request = GPUAdapter.prototype.requestDevice;
+      GPUAdapter.prototype.requestDevice = async function (...options) {
+        return (globalThis.device = await request.apply(this, options));
+      };
+    });
+    await page.goto(`${server.url}/made/host.html`);
     await page.locator('.app.shown').waitFor();
-    assert.ok(lit(await rested()) > LIT);
-    const { drawn, models } = await page.evaluate(() => document.querySelector('lexi-viewer').report);
-    assert.ok(drawn[0] > 0 && models[0].gaussians === 2600, JSON.stringify({ drawn, models }));
+    const before = await rested();
+    assert.ok(lit(before) > LIT);
+    const { drawn, models, renderer } = await page.evaluate(() => document.querySelector('lexi-viewer').report);
+    assert.ok(drawn[0] > 0 && models[0].gaussians === 2600 && renderer === 'webgpu', JSON.stringify({ drawn, models, renderer }));
+    await page.evaluate(() => {
+      GPU.prototype.requestAdapter = async () => null;
+      globalThis.device.destroy();
+    });
+    await page.waitForFunction(() => document.querySelector('lexi-viewer').report.renderer === 'processor');
+    await page.locator('.app.shown').waitFor();
+    await page.locator('canvas[aria-busy=false]').waitFor();
+    const after = await shot(page, 'canvas.picture');
+    assert.ok(psnr(before, after) > SAME, `${psnr(before, after)} dB`);
   });
 
   test('the element draws within a budget, and as much as another one allows', async () => {

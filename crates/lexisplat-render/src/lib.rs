@@ -82,6 +82,8 @@ pub use bulk::bulk;
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, read_cameras_bytes};
 pub use colmap::{MAX_COLMAP_BYTES, read_colmap_binary, read_colmap_text};
+#[cfg(feature = "gpu")]
+pub use cpu::CpuScene;
 pub use cpu::{
     Drawn, GaussianChange, PictureAdjoint, PictureErrors, RenderOptions, render, render_measured, sensitivity,
 };

@@ -1,5 +1,7 @@
 //! Computes the colour of a Gaussian seen from a direction, from dense or sparse SH-rest.
 
+use std::borrow::Cow;
+
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, MAX_COEFFICIENTS, rest_basis};
 use lexisplat::{CodedRest, Dictionary, ShDegree, SparseCodes};
 
@@ -27,7 +29,24 @@ pub struct Radiance<'a> {
 #[derive(Debug)]
 enum Rest<'a> {
     Dense(&'a [f32]),
-    Sparse { codes: &'a SparseCodes, atoms: Vec<[f32; PADDED]> },
+    Sparse { codes: &'a SparseCodes, atoms: Cow<'a, [[f32; PADDED]]> },
+}
+
+/// The atoms of a dictionary as they are multiplied with a basis.
+#[cfg(feature = "gpu")]
+#[derive(Debug)]
+pub(crate) struct Atoms(Vec<[f32; PADDED]>);
+
+#[cfg(feature = "gpu")]
+impl Atoms {
+    pub(crate) fn of(dictionary: &Dictionary) -> Self {
+        Self(interleave(dictionary))
+    }
+
+    /// Returns the number of bytes in memory.
+    pub(crate) fn bytes(&self) -> u64 {
+        size_of_val(self.0.as_slice()) as u64
+    }
 }
 
 type Basis = [f32; MAX_COEFFICIENTS - 1];
@@ -39,11 +58,29 @@ impl<'a> Radiance<'a> {
         let rest = match scene {
             Scene::Dense(splats) => Rest::Dense(&splats.sh_rest),
             Scene::Sparse(model) => {
-                Rest::Sparse { codes: model.codes(), atoms: interleave(model.dictionary()) }
+                Rest::Sparse { codes: model.codes(), atoms: Cow::Owned(interleave(model.dictionary())) }
             }
         };
         let degree = scene.degree();
         Self { degree, shown: degree, dc: &scene.geometry().dc, rest }
+    }
+
+    /// Returns the radiance of Gaussians with dense SH of `degree`.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn of_rows(degree: ShDegree, dc: &'a [[f32; 3]], rest: &'a [f32]) -> Self {
+        Self { degree, shown: degree, dc, rest: Rest::Dense(rest) }
+    }
+
+    /// Returns the radiance of Gaussians with sparse codes over a dictionary of `degree`, which is given as its
+    /// [`Atoms`]. Nothing is copied.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn of_codes(
+        degree: ShDegree,
+        dc: &'a [[f32; 3]],
+        codes: &'a SparseCodes,
+        atoms: &'a Atoms,
+    ) -> Self {
+        Self { degree, shown: degree, dc, rest: Rest::Sparse { codes, atoms: Cow::Borrowed(&atoms.0) } }
     }
 
     /// Leaves out the bands above `degree`. `None` leaves out none.

@@ -11,6 +11,8 @@
 mod adapter;
 mod common;
 #[cfg(feature = "gpu")]
+mod cpu_parts;
+#[cfg(feature = "gpu")]
 mod gpu_broken;
 #[cfg(feature = "gpu")]
 mod gpu_parts;

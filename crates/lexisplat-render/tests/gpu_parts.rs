@@ -23,7 +23,7 @@ fn geometry(all: &Geometry, range: Range<usize>) -> Geometry {
 }
 
 /// The Gaussians in `range` of a dense scene.
-fn dense_run(all: &Splats, range: Range<usize>) -> Splats {
+pub(crate) fn dense_run(all: &Splats, range: Range<usize>) -> Splats {
     let dim = all.degree.rest();
     Splats {
         sh_rest: all.sh_rest[range.start * dim..range.end * dim].to_vec(),
@@ -34,7 +34,7 @@ fn dense_run(all: &Splats, range: Range<usize>) -> Splats {
 }
 
 /// The Gaussians in `range` of a compressed scene; without its exact rows unless `escapes`.
-fn sparse_run(all: &Model, range: Range<usize>, escapes: bool) -> Model {
+pub(crate) fn sparse_run(all: &Model, range: Range<usize>, escapes: bool) -> Model {
     let codes = all.codes();
     let sum = |counts: &[u8]| counts.iter().map(|&c| usize::from(c)).sum::<usize>();
     let (first, dim) = (sum(&codes.counts()[..range.start]), all.degree().rest());
@@ -60,7 +60,7 @@ fn sparse_run(all: &Model, range: Range<usize>, escapes: bool) -> Model {
     Model::new(geometry(all.geometry(), range), meta, all.dictionary().clone(), codes, record).unwrap()
 }
 
-fn sparse(seed: u64, count: usize) -> Model {
+pub(crate) fn sparse(seed: u64, count: usize) -> Model {
     made::model_of(made::scene(seed, count, ShDegree::THREE, true), 90, true)
 }
 

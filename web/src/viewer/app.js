@@ -20,6 +20,9 @@ import { Turn, wantsStill } from './turn.js';
 /** Ends of the names of files that are read. */
 export const EXTENSIONS = ['.lexi', '.ply', '.spz', '.sog', '.splat', '.ksplat', '.glb'];
 
+/** Losses of the GPU after which it is still asked again. */
+const MOST_LOSSES = 1;
+
 /** Words of a script, or parts of a link, that say where the view is from. */
 const PLACES = /^\s*(view|camera|orbit|frame)\b/;
 
@@ -29,6 +32,7 @@ const PLACES = /^\s*(view|camera|orbit|frame)\b/;
  * @property {'all' | 'bar' | 'none'} controls the whole panel, a small bar, or nothing
  * @property {boolean} [still] whether the scene does not turn by itself
  * @property {boolean} whole whether the viewer is all of its page, which then takes keys and the wheel from everywhere
+ * @property {string} [renderer] `processor` draws on the processor in any case; else that is what draws where there is no WebGPU
  * @property {{splats?: number | string, bytes?: number | string}} [budget] most Gaussians that are drawn of a .lexi, and bytes of it that are held
  * @property {string} [poster] address of a still picture, shown until the scene is
  * @property {string} [label] what the scene is, for those who do not see it
@@ -44,6 +48,7 @@ export class App {
   #home = '';
   #isTouched = false;
   #wanted = { words: '', link: '', slots: new Set() };
+  #losses = 0;
 
   /** @param {ShadowRoot} root @param {Options} options */
   constructor(root, options) {
@@ -80,7 +85,7 @@ export class App {
         cancel: (slot) => this.loads.cancel(slot),
       });
     } else if (options.controls === 'bar') {
-      this.dock = makeDock({ run, reset, full, turn: () => (this.turn.on ? this.turn.stop() : this.turn.start()) });
+      this.dock = makeDock({ run, reset, full, turn: () => (this.turn.on ? this.turn.stop() : this.turn.start(true)) });
     }
     this.label(options.label);
     const over = [this.notice.element, this.marks.element, this.overlay.element, this.hint.element];
@@ -96,6 +101,7 @@ export class App {
     this.stage = new Stage(this.canvas, {
       drawn: (report, moving) => this.#update(report, moving),
       failed: (error) => this.fail(error),
+      lost: () => this.#lost().catch((error) => this.#cannot(error)),
       step: (now) => {
         const act = (change) => this.stage.act(change, true).catch(() => {});
         const flies = this.keys.fly(now, act);
@@ -103,7 +109,7 @@ export class App {
       },
     });
     this.turn = new Turn(this.stage, { element: this.element, signal, changed: () => this.dock?.update(this.report, this.turn.on) });
-    this.loads = new Loads(this.stage, budgetOf(options.budget), {
+    this.loads = new Loads(this.stage, this.#budget(), {
       changed: (slot) => this.#changed(slot),
       formed: () => this.#tell(() => {}).catch((error) => this.fail(error)),
       begun: (slot) => this.#first(slot),
@@ -186,7 +192,12 @@ export class App {
 
   /** Draws within another budget. @param {Options['budget']} budget */
   budget(budget) {
-    this.loads.budget = budgetOf(budget);
+    this.options.budget = budget;
+    this.loads.budget = this.#budget();
+  }
+
+  #budget() {
+    return budgetOf(this.options.budget, this.stage.isSlow);
   }
 
   /** Shows annotations, a text that `parseMarks` reads. */
@@ -257,14 +268,37 @@ export class App {
     const missing = obstacle();
     if (missing) return this.#cannot(missing);
     try {
-      const { Viewer } = await loadEngine(this.options.program);
-      if (signal.aborted) return false;
-      await this.stage.start(Viewer, {});
+      await this.stage.start(this.#renderer());
+      this.#begin();
       if (this.#wanted.words) await this.run(this.#wanted.words);
     } catch (error) {
       return this.#cannot(error);
     }
     return !signal.aborted;
+  }
+
+  // A GPU that is lost again and again is not asked any more.
+  #renderer() {
+    const { program, renderer } = this.options;
+    return { program, forced: renderer === 'processor' || this.#losses > MOST_LOSSES };
+  }
+
+  // What depends on who draws.
+  #begin() {
+    this.loads.budget = this.#budget();
+    this.overlay.note(this.stage.isSlow && this.options.controls !== 'none' ? this.stage.why : undefined);
+  }
+
+  // Scenes are loaded again, since they were in the memory of the GPU.
+  async #lost() {
+    this.#losses++;
+    const link = await this.link();
+    const sources = this.loads.slots.map((load) => load?.source);
+    for (const slot of [0, 1]) this.loads.remove(slot);
+    await this.stage.restart(this.#renderer());
+    this.#begin();
+    this.#wanted = { words: '', link, slots: new Set() };
+    sources.forEach((source, slot) => source && this.open(source, slot));
   }
 
   #cannot(why) {

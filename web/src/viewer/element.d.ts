@@ -6,6 +6,13 @@ export interface Program {
   worker: () => Worker;
   /** How many of them; 0 decodes on the page's thread. */
   workers: number;
+  /** What draws where there is no WebGPU. Without it nothing is drawn there. */
+  processor?: {
+    /** Gives the compiled renderer. */
+    compile: () => Promise<WebAssembly.Module>;
+    /** Starts a worker that draws. */
+    worker: () => Worker;
+  };
 }
 
 export type ViewMode = 'first' | 'second' | 'side' | 'wipe' | 'difference';
@@ -21,7 +28,10 @@ export interface ViewerModel {
 
 /** The scenes that are shown, and their figures. */
 export interface ViewerReport {
+  /** Name of the device that draws. */
   device: string;
+  /** Who draws: WebGPU, or the processor. */
+  renderer: 'webgpu' | 'processor';
   mode: ViewMode;
   view: ViewerView | null;
   /** Name of the camera. */
@@ -38,7 +48,7 @@ export interface ViewerReport {
   milliseconds: number | null;
   /** Gaussians drawn of each scene. */
   drawn: [number | null, number | null];
-  /** Bytes on the GPU. */
+  /** Bytes on the GPU, or of the worker that draws. */
   resident_bytes: number;
   scene_bytes: [SceneBytes | null, SceneBytes | null];
   /** dB; null while there are not two scenes to compare. */
@@ -59,7 +69,7 @@ export interface StreamState {
   /** Gaussians, and bytes of the file, that were chosen. */
   splats: number;
   bytes: number;
-  /** Gaussians that are on the GPU. */
+  /** Gaussians that are drawn. */
   drawn: number;
   /** Bytes of the file that are held. */
   held: number;
@@ -124,11 +134,13 @@ export class LexiViewer extends HTMLElement {
   still: boolean;
   /**
    * Most Gaussians that are drawn of a packed .lexi. Of a larger one is drawn what the view shows, near and coarse first.
-   * Default 3,000,000, on phones 1,000,000.
+   * Default 3,000,000, on phones 1,000,000, and 300,000 where the processor draws.
    */
   budget: string;
-  /** Most bytes that are held of such a file. Default 128 MiB, on phones 32 MiB. */
+  /** Most bytes that are held of such a file. Default 128 MiB, on phones and where the processor draws 32 MiB. */
   budgetBytes: string;
+  /** `processor` draws without WebGPU, as browsers that have none do. Any other value draws by WebGPU where there is one. */
+  renderer: 'processor' | '';
   /** A description of the scene in words. */
   alt: string;
   /** The scenes that are shown, and their figures; undefined before there is a picture. */

@@ -5,11 +5,11 @@ import { listenToDrops } from './drop.js';
 import { obstacle } from './engine.js';
 import { folder } from './folder.js';
 
-const ATTRIBUTES = ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still', 'budget', 'budget-bytes'];
+const ATTRIBUTES = ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still', 'budget', 'budget-bytes', 'renderer'];
 // Attributes that are there or not.
 const FLAGS = ['still'];
 // Attributes after a change of which the element begins anew.
-const SHAPES = ['controls', 'still'];
+const SHAPES = ['controls', 'still', 'renderer'];
 // A number of a camera, not a place.
 const NUMBER = /^\s*\d+\s*$/;
 // Where there is no browser the module can still be loaded, as servers that prepare pages do.
@@ -22,8 +22,8 @@ const Base = globalThis.HTMLElement ?? class {};
  * (first, second, side, wipe or difference; follows what the user chooses), `controls` (nothing for a small bar, `all` for the
  * panel, `none`), `camera` (the first view: a link's text, or its part after `view=`), `annotations` (JSON: a list of `at`,
  * `text`, `view`), `still` (the scene does not turn by itself), `budget` and `budget-bytes` (most Gaussians that are drawn of a
- * .lexi, and bytes of it that are held; of a larger one is drawn what the view shows), `alt` (what the scene is, in words). Events: `load`,
- * `progress`, `error`, each with a `detail`.
+ * .lexi, and bytes of it that are held; of a larger one is drawn what the view shows), `renderer` (`processor` draws without WebGPU, as
+ * browsers that have none do), `alt` (what the scene is, in words). Events: `load`, `progress`, `error`, each with a `detail`.
  */
 export class LexiViewer extends Base {
   /** Where the program's parts are. Set it before the first element begins if they are not beside this file. */
@@ -50,6 +50,7 @@ export class LexiViewer extends Base {
       program: LexiViewer.program,
       controls: this.#controls(),
       still: this.still,
+      renderer: this.renderer,
       budget: this.#budget(),
       whole: false,
       poster: this.poster,

@@ -3,12 +3,13 @@
 import { percent, shareOf } from './arrival.js';
 import { reason } from './dom.js';
 
-// Most bytes that a scene and its drawing may take on the GPU. Phones end pages that take more.
+// Most bytes that a scene and its drawing may take in memory, that of the GPU or of the processor. Phones end pages that take more.
 const MEMORY = 2 ** 30;
 
 /** The state of a scene that is being loaded, or was.
  * @typedef {object} Load
  * @property {string} name
+ * @property {string | URL | Blob} source what it is loaded from
  * @property {boolean} file whether it is a file, not an address
  * @property {boolean} active whether bytes still come
  * @property {boolean} shown whether the viewer has it
@@ -50,14 +51,15 @@ export class Loads {
     this.cancel(slot);
     const stop = new AbortController();
     const before = this.slots[slot]?.shown ? this.slots[slot] : undefined;
-    const load = { name: nameOf(source), file: source instanceof Blob, active: true, shown: false, begun: false, progress: undefined };
+    const load = { name: nameOf(source), source, file: source instanceof Blob, active: true, shown: false, begun: false, progress: undefined };
     this.#stops[slot] = stop;
     this.slots[slot] = load;
     this.on.changed(slot);
-    // The viewer refuses what does not fit it, after which further bytes are of no use.
+    // The viewer refuses what does not fit it, after which further bytes are of no use. On the processor coarse pictures have to do
+    // until all of it came, since each part would wait for a picture in full.
     let refusal;
     const act = (change) =>
-      this.stage.act((viewer) => stop.signal.aborted || change(viewer)).catch((error) => {
+      this.stage.act((viewer) => stop.signal.aborted || change(viewer), this.stage.isSlow).catch((error) => {
         refusal ??= error;
         stop.abort();
       });

@@ -11,7 +11,8 @@ export function makeOverlay(split) {
   const line = wipeLine(split);
   const [left, right, score] = ['left', 'right', 'score'].map((name) => make('span', { class: `label ${name}`, hidden: true }));
   const middle = make('span', { class: 'middle', hidden: true });
-  const element = make('div', { class: 'overlay' }, middle, left, right, score, line.element);
+  const note = make('p', { class: 'drawn', hidden: true }, 'Drawn by the processor');
+  const element = make('div', { class: 'overlay' }, middle, left, right, score, line.element, note);
   const label = (where, text) => {
     where.hidden = !text;
     say(where, text);
@@ -34,7 +35,15 @@ export function makeOverlay(split) {
     label(score, beside || difference ? psnr : '');
   }
 
-  return { element, update };
+  return {
+    element,
+    update,
+    /** Says that the processor draws, and why; says nothing for `undefined`. */
+    note(why) {
+      note.hidden = why === undefined;
+      note.title = why ?? '';
+    },
+  };
 }
 
 /** Makes the list of messages, which screen readers read as they come. */

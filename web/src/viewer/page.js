@@ -18,8 +18,9 @@ export function startPage(program, scenes = []) {
   const titled = document.title !== PLAIN_TITLE;
   const root = document.getElementById('viewer').attachShadow({ mode: 'open' });
   const address = new URLSearchParams(carries ? '' : location.search);
+  const renderer = new URLSearchParams(location.search).get('renderer') ?? undefined;
   const budget = { splats: address.get('budget'), bytes: address.get('budget-bytes') };
-  const app = new App(root, { program, controls, still: still !== undefined, budget, whole: true, poster, link, on: told });
+  const app = new App(root, { program, controls, still: still !== undefined, renderer, budget, whole: true, poster, link, on: told });
   if (controls === 'all') {
     listenToDrops(window, {
       signal: new AbortController().signal,

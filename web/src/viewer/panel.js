@@ -145,7 +145,7 @@ function rows(report) {
     ['Gaussians drawn', drawn],
     ['Frame', report.milliseconds === null ? '' : time(report.milliseconds)],
     ['Picture', `${report.width} x ${report.height}`],
-    ['GPU memory', bytes(report.resident_bytes)],
+    [report.renderer === 'processor' ? 'Memory' : 'GPU memory', bytes(report.resident_bytes)],
     ['of it geometry', geometry],
     ['of it SH', sh],
     ['most it ever was', report.most_bytes ? bytes(report.most_bytes) : ''],

@@ -1,4 +1,4 @@
-// The page of one file: the program, its worker and the scene are text in it.
+// The page of one file: the programs, their workers and the scene are text in it.
 
 import { startPage } from './page.js';
 
@@ -15,16 +15,21 @@ function bytesOf(element) {
   return bytes;
 }
 
-async function compile() {
-  const packed = new Blob([bytesOf(document.getElementById('program'))]).stream();
+async function compile(id) {
+  const packed = new Blob([bytesOf(document.getElementById(id))]).stream();
   const bytes = await new Response(packed.pipeThrough(new DecompressionStream('gzip'))).arrayBuffer();
   return WebAssembly.compile(bytes);
 }
 
-const code = new Blob([document.getElementById('worker').textContent], { type: 'text/javascript' });
-const address = URL.createObjectURL(code);
-// Chromium starts no module worker from a blob of a page from disk.
-const program = { compile, worker: () => new Worker(address), workers: WORKERS };
+/** The parts of a program: its WebAssembly, and the script of its workers. */
+function parts(program, script) {
+  const code = new Blob([document.getElementById(script).textContent], { type: 'text/javascript' });
+  const address = URL.createObjectURL(code);
+  // Chromium starts no module worker from a blob of a page from disk.
+  return { compile: () => compile(program), worker: () => new Worker(address) };
+}
+
+const program = { ...parts('program', 'worker'), workers: WORKERS, processor: parts('processor', 'processor-worker') };
 
 const scenes = ['scene', 'scene2'].map((id) => {
   const element = document.getElementById(id);

@@ -1,5 +1,7 @@
 // The canvas: draws when something changed, coarsely while the view moves, in full when it rests.
 
+import { openViewer } from './engine.js';
+
 // Time without motion after which the picture is drawn in full, in milliseconds.
 const REST = 200;
 // Time that a picture may take while the view moves, in milliseconds: 30 a second.
@@ -14,7 +16,13 @@ const LARGEST = 8192;
  * The canvas is `aria-busy` until it shows the last picture of what was asked for, in full.
  */
 export class Stage {
+  /** Why WebGPU does not draw; empty if it does, or was not asked. */
+  why = '';
   #viewer;
+  #painter;
+  /** Whether a picture in full is being drawn on the processor. */
+  #thorough = false;
+  #lost = false;
   #drawing = false;
   #scheduled = 0;
   #resting = 0;
@@ -27,26 +35,63 @@ export class Stage {
 
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {{drawn: (report: any, moving: boolean) => void, failed: (error: unknown) => void, step: (now: number) => boolean}} on
-   *     step is called before each picture and returns whether the view keeps moving by itself
+   * @param {{drawn: (report: any, moving: boolean) => void, failed: (error: unknown) => void, step: (now: number) => boolean, lost: () => void}} on
+   *     step is called before each picture and returns whether the view keeps moving by itself; lost is told that the GPU was
+   *     lost, and with it all scenes
    */
   constructor(canvas, on) {
     this.canvas = canvas;
     this.on = on;
   }
 
-  /** Creates the viewer. Rejects with the reason where this browser cannot draw. */
-  async start(Viewer, options) {
-    const viewer = await Viewer.create(this.canvas, JSON.stringify(options));
-    this.#viewer = viewer;
+  /**
+   * Creates the viewer. Rejects with the reason where this browser cannot draw.
+   * @param {{program: import('./engine.js').Program, forced?: boolean}} options of `openViewer`
+   */
+  async start(options) {
+    await this.#open(options);
     if (this.#closed) return this.#proceed();
     this.#observer = new ResizeObserver((entries) => this.#resize(entries[entries.length - 1]));
+    this.#observe();
+    this.#proceed();
+  }
+
+  /** Creates another viewer in place of the one whose GPU was lost. Rejects with the reason where there is none to be had. */
+  async restart(options) {
+    await this.act((viewer) => {
+      viewer.free?.();
+      this.#viewer = undefined;
+      return this.#open(options);
+    });
+    // It tells the new viewer the size at once.
+    this.#observer?.disconnect();
+    this.#observe();
+  }
+
+  async #open(options) {
+    this.#lost = false;
+    const opened = {};
+    const lost = () => {
+      if (this.#closed || this.#viewer !== opened.viewer) return;
+      this.#lost = true;
+      this.on.lost();
+    };
+    Object.assign(opened, await openViewer({ canvas: this.canvas, lost, ...options }));
+    [this.#viewer, this.#painter, this.why] = [opened.viewer, opened.painter, opened.why];
+    if (this.#painter) this.#scale = COARSEST;
+  }
+
+  #observe() {
     try {
       this.#observer.observe(this.canvas, { box: 'device-pixel-content-box' });
     } catch {
       this.#observer.observe(this.canvas);
     }
-    this.#proceed();
+  }
+
+  /** Whether the processor draws, which takes its time. */
+  get isSlow() {
+    return Boolean(this.#painter);
   }
 
   /**
@@ -59,6 +104,8 @@ export class Stage {
   act(change, moving = false) {
     return new Promise((resolve, reject) => {
       this.#queue.push({ change, moving, resolve, reject });
+      // A moving view does not wait for a picture of where it was.
+      if (moving && this.#thorough) this.#painter.stop();
       this.#proceed();
     });
   }
@@ -86,6 +133,7 @@ export class Stage {
     clearTimeout(this.#resting);
     this.#observer?.disconnect();
     this.#closed = true;
+    if (this.#thorough) this.#painter.stop();
     this.#proceed();
   }
 
@@ -94,7 +142,8 @@ export class Stage {
     if (this.#drawing) return;
     if (this.#closed) {
       this.#viewer?.free?.();
-      this.#viewer = undefined;
+      this.#painter?.close();
+      this.#viewer = this.#painter = undefined;
       for (const { reject } of this.#queue.splice(0)) reject(new DOMException('The viewer was closed.', 'AbortError'));
     }
     while (this.#viewer && !this.#drawing && this.#queue.length > 0) {
@@ -138,15 +187,17 @@ export class Stage {
     clearTimeout(this.#resting);
     this.#resting = moving ? setTimeout(() => this.#rest(), REST + 1 - (performance.now() - this.#moved)) : 0;
     try {
+      this.#thorough = this.isSlow && !moving;
       const draw = async () => (await viewer.draw(moving ? this.#scale : 1)) && JSON.parse(viewer.report());
-      const report = await this.#hold(draw());
+      const report = await this.#hold(draw()).finally(() => (this.#thorough = false));
       if (this.#closed) return;
       if (report) this.#measured(report, moving);
     } catch (error) {
       clearTimeout(this.#resting);
       this.#resting = 0;
       this.#tell();
-      if (!this.#closed) this.on.failed(error);
+      // Of a lost GPU all calls fail.
+      if (!this.#closed && !this.#lost) this.on.failed(error);
     }
   }
 

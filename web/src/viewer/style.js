@@ -30,6 +30,7 @@ canvas { display: block; width: 100%; height: 100%; touch-action: pan-y; cursor:
 canvas:focus, .whole canvas { touch-action: none; }
 canvas:active { cursor: grabbing; }
 canvas:focus-visible { outline-offset: -3px; }
+.picture { position: absolute; inset: 0; pointer-events: none; }
 .app:not(.shown) canvas, .still canvas { visibility: hidden; }
 .still .panel { display: none; }
 
@@ -43,6 +44,11 @@ canvas:focus-visible { outline-offset: -3px; }
 .view:has(~ .panel) .label { max-width: calc(50% - 162px); }
 .view:has(~ .panel) .label.right { right: 312px; }
 .label.score { bottom: 12px; left: 12px; }
+.drawn {
+  position: absolute; left: 4px; bottom: 1px; padding: 0 4px; border-radius: 4px; background: rgb(12 12 14 / 0.68); color: #fff; font-size: 10px; line-height: 13px;
+  pointer-events: auto;
+}
+.app:not(.shown) .drawn { display: none; }
 .middle { left: 50%; top: 0; bottom: 0; width: 2px; margin-left: -1px; background: #fff; box-shadow: 0 0 0 1px rgb(0 0 0 / 0.35); }
 .wipe { top: 0; bottom: 0; width: 28px; margin-left: -14px; pointer-events: auto; touch-action: none; cursor: ew-resize; }
 .wipe::before {

@@ -9,6 +9,7 @@ const COARSE = 0.5;
 
 export class Turn {
   #on = false;
+  #asked = false;
   #seen = true;
   #last;
   #stage;
@@ -34,12 +35,17 @@ export class Turn {
     return this.#on;
   }
 
-  /** Begins to turn, unless this machine is too slow for it. */
-  start() {
-    if (this.#on || this.#stage.scale < COARSE) return;
-    [this.#on, this.#last] = [true, undefined];
+  /** Begins to turn, unless this machine is too slow for it and nobody `asked`. */
+  start(asked = false) {
+    if (this.#on || (!asked && this.#isTooSlow)) return;
+    [this.#on, this.#asked, this.#last] = [true, asked, undefined];
     this.#changed();
     this.#stage.request();
+  }
+
+  // Where the processor draws, a scene that turns would keep it at work.
+  get #isTooSlow() {
+    return this.#stage.isSlow || this.#stage.scale < COARSE;
   }
 
   stop() {
@@ -54,7 +60,7 @@ export class Turn {
       this.#last = undefined;
       return false;
     }
-    if (this.#stage.scale < COARSE) {
+    if (!this.#asked && this.#isTooSlow) {
       this.stop();
       return false;
     }

@@ -11,8 +11,18 @@ globalThis.viewers = [];
 
 export class Viewer {
   static async create(canvas, options) {
+    if (globalThis.noAdapter) throw globalThis.noAdapter;
+    const { promise: lost, resolve: lose } = Promise.withResolvers();
+    return Viewer.#on(canvas, options, { renderer: 'webgpu', lose, device: () => ({ lost }) });
+  }
+
+  static on_processor(options) {
+    return Viewer.#on(document.createElement('canvas'), options, { renderer: 'processor' });
+  }
+
+  static #on(canvas, options, given) {
     JSON.parse(options);
-    const viewer = new Viewer();
+    const viewer = Object.assign(new Viewer(), given);
     viewer.canvas = canvas;
     viewer.pen = canvas.getContext('2d');
     viewer.calls = [];
@@ -122,6 +132,10 @@ export class Viewer {
     this.parts[slot]++;
   }
 
+  remove_part(slot, index) {
+    this.#called('remove_part', slot, index);
+  }
+
   remove(slot) {
     this.#called('remove', slot);
     this.models[slot] = null;
@@ -129,12 +143,28 @@ export class Viewer {
     this.#possible(false);
   }
 
+  // As on the processor: the page has the stand-in of the worker draw.
+  begin(scale) {
+    if (this.freed || this.busy) throw new Error('recursive use of an object');
+    if (!this.dirty && this.finest >= scale) return undefined;
+    this.dirty = false;
+    this.finest = 0;
+    this.draws.push(scale);
+    const { width, height } = this.canvas;
+    return Float32Array.of(0, MODES.indexOf(this.view.mode), this.view.split, 10, 0, 0, width, height, scale, ...this.view.background);
+  }
+
+  drawn(figures) {
+    this.figures = figures;
+    this.finest = this.draws.at(-1);
+  }
+
   async draw(scale) {
     if (this.freed || this.busy) throw new Error('recursive use of an object');
-    if (!this.dirty && this.drawn >= scale) return false;
+    if (!this.dirty && this.finest >= scale) return false;
     this.busy = true;
     this.dirty = false;
-    this.drawn = scale;
+    this.finest = scale;
     await new Promise((go) => setTimeout(go, globalThis.slow ?? 2));
     this.busy = false;
     this.draws.push(scale);
@@ -178,7 +208,7 @@ export class Viewer {
     const both = this.models.every(Boolean);
     const drawn = this.models.map((model) => model && model.gaussians);
     return JSON.stringify({
-      device: DEVICE, mode, view: this.#seen(), camera: 'orbit 0', index: 0, cameras: 4, free: true, width: this.canvas.width, height: this.canvas.height,
+      device: DEVICE, renderer: this.renderer, mode, view: this.#seen(), camera: 'orbit 0', index: 0, cameras: 4, free: true, width: this.canvas.width, height: this.canvas.height,
       milliseconds: globalThis.cost ?? 3.2, drawn, resident_bytes: 5e6, scene_bytes: this.models.map((model) => model && { geometry: 2e6, sh: 5e5 }),
       psnr: both ? 41.27 : null, identical: false, split, gain, degree, background, models: this.models,
     });

@@ -17,11 +17,8 @@ export const npm = process.env.LEXISPLAT_NPM && resolve(process.env.LEXISPLAT_NP
 
 const EXECUTABLE = process.env.CHROMIUM ?? '/usr/bin/chromium';
 // Without both SwiftShader flags compute works, but a canvas of WebGPU stays white.
+const GPU_FLAGS = ['--enable-unsafe-webgpu', '--enable-features=Vulkan', '--use-vulkan=swiftshader', '--use-angle=swiftshader'];
 const FLAGS = [
-  '--enable-unsafe-webgpu',
-  '--enable-features=Vulkan',
-  '--use-vulkan=swiftshader',
-  '--use-angle=swiftshader',
   '--no-sandbox',
   '--no-first-run',
   '--disable-background-networking',
@@ -44,12 +41,13 @@ const PIECE = 16 * 1024;
 /**
  * Starts Chromium.
  * @param {string[]} [more] further flags
+ * @param {{gpu?: boolean}} [options] gpu: whether there is WebGPU and WebGL, in software; without, the browser draws on the processor
  * @returns {Promise<import('playwright-core').Browser>}
  */
-export async function launch(more = []) {
+export async function launch(more = [], { gpu = true } = {}) {
   if (!npm) throw new Error('LEXISPLAT_NPM names no folder of node_modules with playwright-core');
   const { chromium } = createRequire(join(npm, 'x.js'))('playwright-core');
-  return chromium.launch({ executablePath: EXECUTABLE, args: [...FLAGS, ...more] });
+  return chromium.launch({ executablePath: EXECUTABLE, args: [...(gpu ? GPU_FLAGS : ['--disable-gpu']), ...FLAGS, ...more] });
 }
 
 /**

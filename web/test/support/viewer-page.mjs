@@ -28,6 +28,8 @@ export async function serveStub(more = {}) {
     '/made': made,
     '/wasm/viewer.js': here('../stub/viewer.js'),
     '/wasm/viewer_bg.wasm': join(made, 'empty.wasm'),
+    '/wasm/processor_bg.wasm': join(made, 'empty.wasm'),
+    '/src/processor-worker.js': here('../stub/processor-worker.js'),
     '/src/session.js': here('../stub/session.js'),
     ...more,
   });
@@ -61,11 +63,11 @@ export async function newPage(browser, options = {}) {
 /**
  * Gives a function that defines tests, which fail if the page that `opened` gives had faults, and closes the page.
  * @param {() => import('playwright-core').Page | undefined} opened
- * @param {object} [options] of every test
+ * @param {object} [options] of every test; a test may have more of its own
  */
 export function faultless(opened, options = {}) {
-  return (name, run) =>
-    it(name, options, async () => {
+  return (name, run, own = {}) =>
+    it(name, { ...options, ...own }, async () => {
       try {
         await run();
         assert.deepEqual(opened().faults, []);

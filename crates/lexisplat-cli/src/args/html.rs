@@ -7,8 +7,8 @@ use clap::Args;
 /// Write one web page that shows a scene. Viewer and scene are in one file, which opens from disk and loads nothing
 /// else.
 ///
-/// Browsers with WebGPU draw the scene; a .lexi is drawn from its codes. Other browsers show a still picture. A wipe
-/// line compares the first scene with the second, if there is one. The page has a small bar; `--tools` shows the whole
+/// Browsers draw the scene by WebGPU, or on the processor where there is none; a .lexi is drawn from its codes. Browsers that can do
+/// neither show a still picture. A wipe line compares the first scene with the second, if there is one. The page has a small bar; `--tools` shows the whole
 /// panel with figures and files. Without a scene the page is a viewer for files that are dropped on it.
 #[derive(Debug, Args)]
 pub(crate) struct Html {

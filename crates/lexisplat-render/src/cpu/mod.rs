@@ -18,6 +18,9 @@ mod math;
 mod measured_tiles;
 mod moments;
 mod order;
+mod painting;
+#[cfg(feature = "gpu")]
+mod parts;
 mod project;
 mod sensitivity;
 mod splat;
@@ -29,23 +32,21 @@ mod visible;
 mod workspace;
 
 use lexisplat::ShDegree;
-use lexisplat::simd::Simd;
-use web_time::Instant;
 
 use crate::camera::Camera;
-use crate::conventions::TILE;
 use crate::error::Result;
 use crate::image::Image;
-use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
 pub use adjoint::{GaussianChange, PictureAdjoint, PictureErrors};
-use blend::{Canvas, Tile};
 #[cfg(feature = "gpu")]
 pub(crate) use change::carry;
 #[cfg(feature = "gpu")]
 pub(crate) use moments::{Moments, SUMS};
+use painting::{Painting, StageTimer};
+#[cfg(feature = "gpu")]
+pub use parts::CpuScene;
 pub(crate) use project::Projection;
 pub use sensitivity::sensitivity;
 pub(crate) use workspace::Workspace;
@@ -118,29 +119,6 @@ pub(crate) fn render_with(
     Ok(draw(workspace, scene, &projection, options, tiles::MAX_ENTRIES))
 }
 
-/// Times the stages of a picture.
-struct StageTimer {
-    start: Instant,
-    times: Vec<(&'static str, f64)>,
-}
-
-impl StageTimer {
-    fn start() -> Self {
-        Self { start: Instant::now(), times: Vec::new() }
-    }
-
-    /// Adds the time since the last call to the duration of `stage`.
-    fn end(&mut self, stage: &'static str) {
-        let now = Instant::now();
-        let milliseconds = now.duration_since(self.start).as_secs_f64() * 1e3;
-        match self.times.iter_mut().find(|(name, _)| *name == stage) {
-            Some((_, sum)) => *sum += milliseconds,
-            None => self.times.push((stage, milliseconds)),
-        }
-        self.start = now;
-    }
-}
-
 /// Draws with at most `max_entries` entries in the lists of tiles at once.
 fn draw(
     workspace: &mut Workspace,
@@ -149,42 +127,12 @@ fn draw(
     options: &RenderOptions,
     max_entries: u64,
 ) -> Drawn {
-    let mut stages = StageTimer::start();
-    let simd = Simd::current();
-    let (camera, grid) = (&projection.camera, projection.grid);
-    let [width, height] = camera.picture_size();
-    let side = width as usize;
-    let mut pixels = vec![options.background; side * height as usize];
+    let stages = StageTimer::start();
     let radiance = Radiance::new(scene).up_to(options.max_degree);
     workspace.project(scene, &radiance, projection);
-    let Workspace { visible, order, lists, .. } = workspace;
-    stages.end("project");
-    order.sort(visible);
-    stages.end("sort");
-    let mut rest = pixels.as_mut_slice();
-    for band in tiles::bands(order, grid, max_entries) {
-        lists.fill(order, grid, projection.chosen.as_ref(), &band);
-        stages.end("tiles");
-        let tiles = projection.tiles(&band);
-        // Tiles that lie side by side in the drawn picture: a row of tiles, or one tile of a set.
-        let rows: Vec<&[(usize, Tile)]> = tiles.chunk_by(|a, b| a.1.drawn()[1] == b.1.drawn()[1]).collect();
-        let own = (rows.len() * TILE * side).min(rest.len());
-        let (drawn, after) = std::mem::take(&mut rest).split_at_mut(own);
-        rest = after;
-        drawn.par_chunks_mut(side * TILE).zip(rows).for_each(|(lines, row)| {
-            let mut canvas = Canvas::default();
-            for &(tile, place) in row {
-                canvas.draw(simd, &visible.slots, lists.of(tile), place, options.background);
-                for (y, line) in lines.chunks_mut(side).enumerate() {
-                    let line = line[place.drawn()[0]..].iter_mut().take(TILE);
-                    line.enumerate().for_each(|(x, pixel)| *pixel = canvas.pixel(x, y, options.background));
-                }
-            }
-        });
-        stages.end("blend");
-    }
-    let image = Image { width, height, pixels };
-    Drawn { image, gaussians: order.keys.len(), stage_times: stages.times }
+    let mut painting = Painting::begin(workspace, projection.clone(), options, max_entries, stages);
+    while painting.advance(workspace) {}
+    painting.finish()
 }
 
 #[cfg(test)]

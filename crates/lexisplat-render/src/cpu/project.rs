@@ -503,7 +503,7 @@ mod tests {
     use lexisplat::{SceneMeta, ShDegree, Splats};
 
     use super::super::splat::Splat;
-    use super::super::visible::Visible;
+    use super::super::visible::{Piece, Visible};
     use super::*;
     use crate::camera::straight_ahead;
     use crate::radiance::Radiance;
@@ -526,7 +526,8 @@ mod tests {
         let projection = Projection::new(&camera, antialiased);
         let (mut visible, mut keys) = (Visible::default(), Vec::new());
         let radiance = Radiance::new(&Scene::from(splats));
-        visible.project(&mut keys, Simd::current(), &splats.geometry, None, &radiance, &projection);
+        let piece = Piece { geometry: &splats.geometry, clusters: None, radiance: &radiance };
+        visible.project(&mut keys, Simd::current(), &[piece], &projection);
         keys.first().map(|&(depth, slot)| (visible.slots[slot as usize], depth))
     }
 

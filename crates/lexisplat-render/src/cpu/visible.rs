@@ -26,41 +26,52 @@ pub(super) struct Visible {
     rects: Vec<PixelRect>,
 }
 
+/// Some of the Gaussians of a scene, or all of them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Piece<'a> {
+    pub(super) geometry: &'a Geometry,
+    /// The clusters of `geometry`. Clusters that a picture cannot show are skipped, if there are any.
+    pub(super) clusters: Option<&'a Clusters>,
+    pub(super) radiance: &'a Radiance<'a>,
+}
+
 impl Visible {
-    /// Projects all Gaussians, and overwrites those of the last picture. Clusters that the picture cannot show are
-    /// skipped, if there are `clusters`. Replaces `keys` by the (depth, slot) of the Gaussians that may be visible, in
-    /// order of index.
+    /// Projects the Gaussians of all pieces, and overwrites those of the last picture. Replaces `keys` by the (depth,
+    /// slot) of the Gaussians that may be visible, piece by piece, in order of index.
     pub(super) fn project(
         &mut self,
         keys: &mut Vec<(u32, u32)>,
         simd: Simd,
-        geometry: &Geometry,
-        clusters: Option<&Clusters>,
-        radiance: &Radiance<'_>,
+        pieces: &[Piece<'_>],
         projection: &Projection,
     ) {
-        self.slots.resize(geometry.len(), Splat::default());
-        self.rects.resize(geometry.len(), PixelRect::default());
-        keys.resize(geometry.len(), (0, 0));
-        let counts: Vec<usize> = self
-            .slots
-            .par_chunks_mut(GAUSSIANS_PER_TASK)
-            .zip(self.rects.par_chunks_mut(GAUSSIANS_PER_TASK))
-            .zip(keys.par_chunks_mut(GAUSSIANS_PER_TASK))
-            .enumerate()
-            .map(|(task, ((slots, rects), keys))| {
-                let mut task = Task { first: task * GAUSSIANS_PER_TASK, slots, rects, keys };
-                simd.dispatch(
-                    #[inline(always)]
-                    || task.project(geometry, clusters, radiance, projection),
-                )
-            })
-            .collect();
-        let mut len = 0;
-        for (task, count) in counts.into_iter().enumerate() {
-            let first = task * GAUSSIANS_PER_TASK;
-            keys.copy_within(first..first + count, len);
-            len += count;
+        let all = pieces.iter().map(|piece| piece.geometry.len()).sum();
+        self.slots.resize(all, Splat::default());
+        self.rects.resize(all, PixelRect::default());
+        keys.resize(all, (0, 0));
+        let (mut first, mut len) = (0, 0);
+        for piece in pieces {
+            let end = first + piece.geometry.len();
+            let counts: Vec<usize> = self.slots[first..end]
+                .par_chunks_mut(GAUSSIANS_PER_TASK)
+                .zip(self.rects[first..end].par_chunks_mut(GAUSSIANS_PER_TASK))
+                .zip(keys[first..end].par_chunks_mut(GAUSSIANS_PER_TASK))
+                .enumerate()
+                .map(|(task, ((slots, rects), keys))| {
+                    let own = task * GAUSSIANS_PER_TASK;
+                    let mut task = Task { first: own, slot: first + own, slots, rects, keys };
+                    simd.dispatch(
+                        #[inline(always)]
+                        || task.project(piece, projection),
+                    )
+                })
+                .collect();
+            for (task, count) in counts.into_iter().enumerate() {
+                let at = first + task * GAUSSIANS_PER_TASK;
+                keys.copy_within(at..at + count, len);
+                len += count;
+            }
+            first = end;
         }
         keys.truncate(len);
     }
@@ -73,8 +84,10 @@ impl Visible {
 
 /// The projections of consecutive Gaussians.
 struct Task<'a> {
-    /// Index of the first Gaussian, which is also the index of the first slot.
+    /// Index of the first Gaussian within its piece.
     first: usize,
+    /// Index of the first slot.
+    slot: usize,
     slots: &'a mut [Splat],
     rects: &'a mut [PixelRect],
     keys: &'a mut [(u32, u32)],
@@ -83,15 +96,10 @@ struct Task<'a> {
 impl Task<'_> {
     /// Projects as many Gaussians as there are slots. Returns the number of slots that were filled.
     #[inline(always)]
-    fn project(
-        &mut self,
-        geometry: &Geometry,
-        clusters: Option<&Clusters>,
-        radiance: &Radiance<'_>,
-        projection: &Projection,
-    ) -> usize {
-        let Self { first, slots, rects, keys } = self;
-        let first = *first;
+    fn project(&mut self, piece: &Piece<'_>, projection: &Projection) -> usize {
+        let Piece { geometry, clusters, radiance } = *piece;
+        let Self { first, slot, slots, rects, keys } = self;
+        let (first, first_slot) = (*first, *slot);
         let end = first + slots.len();
         let mut count = 0;
         for start in (first..end).step_by(LANES) {
@@ -123,7 +131,7 @@ impl Task<'_> {
                 // Depths are positive, so the order of their bits is the order of their values. Indices of Gaussians fit
                 // in `u32`.
                 let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
-                keys[count] = (placed.depth[lane].to_bits(), index(first + count));
+                keys[count] = (placed.depth[lane].to_bits(), index(first_slot + count));
                 slots[count] = Splat {
                     centre: placed.centre.map(|v| v[lane]),
                     conic: placed.conic.map(|v| v[lane]),

@@ -10,7 +10,7 @@ use super::clusters::Clusters;
 use super::order::Order;
 use super::project::Projection;
 use super::tiles::TileLists;
-use super::visible::Visible;
+use super::visible::{Piece, Visible};
 
 /// Intermediate results of drawing a picture, about 90 bytes for each Gaussian. The next picture overwrites everything
 /// but the clusters, which belong to the scene.
@@ -40,6 +40,13 @@ impl Workspace {
     pub(super) fn project(&mut self, scene: &Scene<'_>, radiance: &Radiance<'_>, projection: &Projection) {
         let (keys, geometry) = (&mut self.order.keys, scene.geometry());
         let clusters = self.clusters.as_ref().filter(|clusters| clusters.len() == geometry.len());
-        self.visible.project(keys, Simd::current(), geometry, clusters, radiance, projection);
+        let piece = Piece { geometry, clusters, radiance };
+        self.visible.project(keys, Simd::current(), &[piece], projection);
+    }
+
+    /// Projects the Gaussians of `pieces` that a picture may show.
+    #[cfg(feature = "gpu")]
+    pub(super) fn project_pieces(&mut self, pieces: &[Piece<'_>], projection: &Projection) {
+        self.visible.project(&mut self.order.keys, Simd::current(), pieces, projection);
     }
 }

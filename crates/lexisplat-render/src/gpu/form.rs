@@ -1,6 +1,6 @@
 //! The properties that all parts of a scene share.
 
-use lexisplat::Dictionary;
+use lexisplat::{Dictionary, ShDegree};
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
@@ -55,6 +55,21 @@ impl SceneForm {
             ShKind::Dense { half: true } => ShPath::DenseF16,
             ShKind::Codes { .. } => ShPath::SparseOrdered,
         }
+    }
+
+    /// Returns the SH degree.
+    pub(crate) fn degree(&self) -> ShDegree {
+        self.layout.degree
+    }
+
+    /// Returns whether the rules for anti-aliasing apply.
+    pub(crate) fn antialiased(&self) -> bool {
+        self.antialiased
+    }
+
+    /// Returns the dictionary. It is empty if rows are dense.
+    pub(crate) fn dictionary(&self) -> &Dictionary {
+        &self.dictionary
     }
 
     /// Returns the form as bytes, for [`Self::from_bytes`] of the same version of this crate.

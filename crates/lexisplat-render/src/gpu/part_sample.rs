@@ -6,8 +6,8 @@ use super::part::ScenePart;
 use super::part_layout::Section;
 
 /// Number of values of a Gaussian in [`Section::Bodies`] and in [`Section::Shapes`].
-const BODY: usize = 4;
-const SHAPE: usize = 8;
+pub(super) const BODY: usize = 4;
+pub(super) const SHAPE: usize = 8;
 
 impl ScenePart<'_> {
     /// Returns every `step`-th of the Gaussians that can be drawn, with base colours of zero. A `step` of 0 counts as 1.
@@ -32,7 +32,7 @@ impl ScenePart<'_> {
 }
 
 /// Returns the rows of `N` numbers in `bytes`.
-fn rows<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = [f32; N]> {
+pub(super) fn rows<const N: usize>(bytes: &[u8]) -> impl Iterator<Item = [f32; N]> {
     let number = |bytes: &[u8; 4]| f32::from_ne_bytes(*bytes);
     bytes.chunks_exact(4 * N).map(move |row| {
         let (words, _) = row.as_chunks::<4>();

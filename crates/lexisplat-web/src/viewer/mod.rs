@@ -1,7 +1,9 @@
-//! The viewer on the main thread: the state and commands of `lexisplat view`, drawn by WebGPU on a canvas.
+//! The viewer on the main thread: the state and commands of `lexisplat view`, drawn on a canvas by WebGPU or on the processor.
 
 mod bounds;
 mod screen;
+mod view;
+mod worker;
 
 use js_sys::{Object, Reflect, Uint8Array};
 use lexisplat::packed::Eye;
@@ -13,14 +15,21 @@ use wasm_bindgen::prelude::*;
 use web_sys::HtmlCanvasElement;
 
 use self::bounds::Bounds;
-use self::screen::{Drawn, Screen};
+use self::screen::Screen;
+use self::view::{Drawn, View};
+use self::worker::Worker;
 use crate::thrown;
+
+/// Name of the processor as a renderer.
+const PROCESSOR: &str = "processor";
 
 /// Shows one or two scenes on a canvas. No method may be called before the promise of another method settles.
 #[wasm_bindgen]
 pub struct Viewer {
     state: State,
-    screen: Screen,
+    /// The GPU. Without one a worker draws on the processor.
+    screen: Option<Screen>,
+    worker: Worker,
     bounds: Bounds,
     /// Facts about each scene from the page. The report returns them.
     infos: [Option<Value>; 2],
@@ -43,20 +52,39 @@ impl Viewer {
     /// # Errors
     /// An error that tells why this browser cannot draw.
     pub async fn create(canvas: HtmlCanvasElement, options: String) -> Result<Viewer, JsError> {
-        let options: Value = serde_json::from_str(&options).map_err(thrown)?;
+        let size = (canvas.width().max(1), canvas.height().max(1));
+        let mut viewer = Self::on_processor(&options)?;
+        viewer.size = size;
+        viewer.screen = Some(Screen::open(canvas).await.map_err(thrown)?);
+        Ok(viewer)
+    }
+
+    /// Returns a viewer whose pictures a worker draws on the processor. `options` are those of [`Self::create`]. The page has to
+    /// give the worker every form and part that it gives the viewer.
+    ///
+    /// # Errors
+    /// An error if `options` is not JSON.
+    pub fn on_processor(options: &str) -> Result<Viewer, JsError> {
+        let options: Value = serde_json::from_str(options).map_err(thrown)?;
         let colour = |k: usize| options["background"][k].as_f64().unwrap_or(0.0);
         #[expect(clippy::cast_possible_truncation, reason = "a colour")]
         let background = [0, 1, 2].map(|k| colour(k) as f32);
-        let size = (canvas.width().max(1), canvas.height().max(1));
         Ok(Self {
             state: State::new(background),
-            screen: Screen::open(canvas).await.map_err(thrown)?,
+            screen: None,
+            worker: Worker::default(),
             bounds: Bounds::default(),
             infos: [None, None],
             given: false,
-            size,
+            size: (1, 1),
             drawn: None,
         })
+    }
+
+    /// Returns the `GPUDevice` that draws, if there is one.
+    #[must_use]
+    pub fn device(&self) -> Option<JsValue> {
+        self.screen.as_ref()?.device().cloned()
     }
 
     /// Carries out the words of a script; see [`lexisplat_view::SCRIPT_WORDS`]. Words about files are refused.
@@ -138,7 +166,9 @@ impl Viewer {
     /// Sets the size of the canvas, in device pixels.
     pub fn resize(&mut self, width: u32, height: u32) {
         self.size = (width.max(1), height.max(1));
-        self.screen.resize(self.size);
+        if let Some(screen) = &mut self.screen {
+            screen.resize(self.size);
+        }
         self.drawn = None;
     }
 
@@ -163,7 +193,9 @@ impl Viewer {
         let slot = slot_of(slot)?;
         let form = SceneForm::from_bytes(&bytes).map_err(thrown)?;
         let info: Value = serde_json::from_str(&info).map_err(thrown)?;
-        self.screen.begin(slot, &form).await.map_err(thrown)?;
+        if let Some(screen) = &mut self.screen {
+            screen.begin(slot, &form).await.map_err(thrown)?;
+        }
         let wanted = info["shown"].as_u64().unwrap_or(0);
         let first_view = info["view"].as_str().and_then(Pose::parse);
         self.infos[slot.index()] = Some(info);
@@ -184,7 +216,9 @@ impl Viewer {
     pub async fn part(&mut self, slot: usize, index: usize, bytes: Vec<u8>) -> Result<(), JsError> {
         let slot = slot_of(slot)?;
         let part = ScenePart::from_bytes(&bytes).map_err(thrown)?;
-        self.screen.put(slot, index, &part).await.map_err(thrown)?;
+        if let Some(screen) = &mut self.screen {
+            screen.put(slot, index, &part).await.map_err(thrown)?;
+        }
         if self.bounds.add(slot, index, &part) {
             self.look_at_scene();
         }
@@ -197,7 +231,10 @@ impl Viewer {
     /// # Errors
     /// An error if there is no such slot.
     pub fn remove_part(&mut self, slot: usize, index: usize) -> Result<(), JsError> {
-        self.screen.remove_part(slot_of(slot)?, index);
+        let slot = slot_of(slot)?;
+        if let Some(screen) = &mut self.screen {
+            screen.remove_part(slot, index);
+        }
         self.drawn = None;
         Ok(())
     }
@@ -226,34 +263,40 @@ impl Viewer {
     /// An error if there is no such slot.
     pub fn remove(&mut self, slot: usize) -> Result<(), JsError> {
         let slot = slot_of(slot)?;
-        self.screen.remove(slot);
+        if let Some(screen) = &mut self.screen {
+            screen.remove(slot);
+        }
         self.infos[slot.index()] = None;
         self.state.set_open([0, 1].map(|k| self.infos[k].is_some()));
         self.drawn = None;
         Ok(())
     }
 
-    /// Draws and shows changes since the last call, with both sides of pictures multiplied by `scale`, at most 1. Returns
+    /// Draws on the GPU and shows changes since the last call, with both sides of pictures multiplied by `scale`, at most 1. Returns
     /// whether there was anything to do.
     ///
     /// # Errors
     /// Errors of the GPU.
     pub async fn draw(&mut self, scale: f64) -> Result<bool, JsError> {
-        let Some(camera) = self.state.camera(self.size.0, self.size.1) else { return Ok(false) };
-        let view = screen::View {
+        let Some(view) = self.wanted_view(scale) else { return Ok(false) };
+        let Some(screen) = &mut self.screen else { return Ok(false) };
+        let before = self.drawn.take();
+        self.drawn = Some(screen.draw(view, before).await.map_err(thrown)?);
+        Ok(true)
+    }
+
+    /// Returns the view to draw; `None` if it is shown already.
+    fn wanted_view(&self, scale: f64) -> Option<View> {
+        let view = View {
             // Coarse pictures are of a moving view. Only visible models are drawn then.
             wanted: if scale < 1.0 { self.state.arrangement().mode.needs() } else { [true; 2] },
-            camera,
+            camera: self.state.camera(self.size.0, self.size.1)?,
             options: self.state.options(),
             arrangement: self.state.arrangement(),
             scale: scale.clamp(0.0, 1.0),
         };
-        if self.drawn.as_ref().is_some_and(|drawn| drawn.shows(&view)) {
-            return Ok(false);
-        }
-        let before = self.drawn.take();
-        self.drawn = Some(self.screen.draw(view, before).await.map_err(thrown)?);
-        Ok(true)
+        let is_shown = self.drawn.as_ref().is_some_and(|drawn| drawn.shows(&view));
+        (!is_shown).then_some(view)
     }
 
     /// Returns the state of the view and statistics as JSON.
@@ -262,10 +305,12 @@ impl Viewer {
         let (arrangement, options) = (self.state.arrangement(), self.state.options());
         let drawn = self.drawn.as_ref();
         let camera = self.state.camera(self.size.0, self.size.1);
-        let scenes =
-            self.screen.scene_bytes().map(|bytes| bytes.map(|b| json!({"geometry": b.geometry, "sh": b.sh})));
+        let (screen, worker) = (self.screen.as_ref(), &self.worker);
+        let scene_bytes = screen.map_or(worker.bytes, Screen::scene_bytes);
+        let scenes = scene_bytes.map(|bytes| bytes.map(|b| json!({"geometry": b.geometry, "sh": b.sh})));
         let value = json!({
-            "device": self.screen.device_name(),
+            "device": screen.map_or(PROCESSOR, Screen::device_name),
+            "renderer": if screen.is_some() { "webgpu" } else { PROCESSOR },
             "mode": arrangement.mode.name(),
             "modes": Mode::ALL.map(Mode::name),
             "view": camera.as_ref().map(|camera| json!({
@@ -284,9 +329,9 @@ impl Viewer {
             "height": self.size.1,
             "milliseconds": drawn.map(|drawn| drawn.milliseconds),
             "drawn": drawn.map_or([None; 2], |drawn| drawn.visible),
-            "gaussians": self.screen.gaussians(),
-            "resident_bytes": self.screen.resident_bytes(),
-            "most_bytes": self.screen.most_bytes(),
+            "gaussians": screen.map_or(worker.gaussians, Screen::gaussians),
+            "resident_bytes": screen.map_or(worker.resident, Screen::resident_bytes),
+            "most_bytes": screen.map_or(worker.resident, Screen::most_bytes),
             "scene_bytes": scenes,
             "psnr": drawn.and_then(|drawn| drawn.psnr),
             "identical": drawn.is_some_and(|drawn| drawn.identical),
@@ -315,13 +360,14 @@ impl Viewer {
     }
 
     /// Returns the picture shown as `{width, height, data}`, with red, green, blue and opacity of each pixel, 8 bits
-    /// each.
+    /// each. The page has the pictures of a worker itself.
     ///
     /// # Errors
-    /// An error if nothing was drawn yet, and errors of the GPU.
+    /// An error if nothing was drawn yet on a GPU, and errors of the GPU.
     pub async fn picture(&mut self) -> Result<Object, JsError> {
-        let drawn = self.drawn.as_ref().ok_or_else(|| thrown("nothing is shown yet"))?;
-        let (width, height, pixels) = self.screen.picture(drawn).await.map_err(thrown)?;
+        let shown = self.screen.as_mut().zip(self.drawn.as_ref());
+        let (screen, drawn) = shown.ok_or_else(|| thrown("nothing is shown yet"))?;
+        let (width, height, pixels) = screen.picture(drawn).await.map_err(thrown)?;
         let data: Vec<u8> = pixels.iter().flat_map(|&[r, g, b]| [r, g, b, u8::MAX]).collect();
         let out = Object::new();
         let set = |name: &str, value: JsValue| {

@@ -1,56 +1,18 @@
 //! The canvas, and the GPU that draws on it.
 
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, SceneBytes, SceneForm, ScenePart};
-use lexisplat_render::{Camera, RenderOptions};
-use lexisplat_view::{Arrangement, Composer, Composition, Picture, Presenter, Rgb8Image, Slot};
+use lexisplat_view::{Composer, Composition, Picture, Presenter, Rgb8Image, Slot};
+use wasm_bindgen::JsValue;
 use web_sys::HtmlCanvasElement;
 use wgpu::CurrentSurfaceTexture;
+
+use super::view::{Drawn, View};
 
 /// Result with an error in words for people.
 type Result<T> = std::result::Result<T, String>;
 
 /// Number of channels of a pixel.
 const CHANNELS: f64 = 3.0;
-
-/// All values on which a picture on the canvas depends.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct View {
-    /// The models to draw, if they are open.
-    pub(super) wanted: [bool; 2],
-    /// The camera, at the size of the canvas.
-    pub(super) camera: Camera,
-    pub(super) options: RenderOptions,
-    pub(super) arrangement: Arrangement,
-    /// Factor on both sides of pictures, 0 to 1.
-    pub(super) scale: f64,
-}
-
-/// A view that was drawn.
-#[derive(Debug, Clone)]
-pub(super) struct Drawn {
-    view: View,
-    pictures: [Option<Picture>; 2],
-    /// Number of Gaussians that may touch each picture.
-    pub(super) visible: [Option<u32>; 2],
-    pub(super) milliseconds: f64,
-    /// PSNR of the second picture against the first, in dB.
-    pub(super) psnr: Option<f64>,
-    pub(super) identical: bool,
-}
-
-impl Drawn {
-    /// Returns whether this is `view`, or a finer picture of it.
-    pub(super) fn shows(&self, view: &View) -> bool {
-        self.has_pictures_of(view) && self.view.arrangement == view.arrangement
-    }
-
-    fn has_pictures_of(&self, view: &View) -> bool {
-        let all = self.view.wanted.iter().zip(view.wanted).all(|(&has, wants)| has || !wants);
-        all && self.view.scale >= view.scale
-            && self.view.camera == view.camera
-            && self.view.options == view.options
-    }
-}
 
 /// The canvas, the device, and the scenes on it.
 pub(super) struct Screen {
@@ -130,10 +92,7 @@ impl Screen {
     /// Draws and shows `view`. Reuses the pictures of `before` if they are those of `view`.
     pub(super) async fn draw(&mut self, view: View, before: Option<Drawn>) -> Result<Drawn> {
         let drawn = match before.filter(|before| before.has_pictures_of(&view)) {
-            Some(before) => {
-                let view = View { wanted: before.view.wanted, scale: before.view.scale, ..view };
-                Drawn { view, ..before }
-            }
+            Some(before) => before.arranged(view),
             None => self.pictures(view).await?,
         };
         self.show(&drawn)?;
@@ -142,7 +101,7 @@ impl Screen {
 
     async fn pictures(&mut self, view: View) -> Result<Drawn> {
         let clock = web_time::Instant::now();
-        let camera = scaled(&view.camera, view.scale);
+        let camera = view.scaled_camera();
         let (mut pictures, mut visible) = ([None, None], [None; 2]);
         for slot in Slot::BOTH.map(Slot::index) {
             let Some(scene) = self.scenes[slot].as_ref().filter(|_| view.wanted[slot]) else { continue };
@@ -195,7 +154,8 @@ impl Screen {
                 })],
                 ..wgpu::RenderPassDescriptor::default()
             });
-            let [x, y, width, height] = self.place(drawn);
+            let size = (self.configuration.width, self.configuration.height);
+            let [x, y, width, height] = drawn.view.place(size);
             pass.set_viewport(x, y, width, height, 0.0, 1.0);
             self.presenter.draw(&mut pass, &bound);
         }
@@ -204,26 +164,17 @@ impl Screen {
         Ok(())
     }
 
-    /// Returns the place of the pictures on the canvas. Cameras with an aspect of their own leave borders.
-    fn place(&self, drawn: &Drawn) -> [f32; 4] {
-        let (width, height) = (self.configuration.width, self.configuration.height);
-        let camera = &drawn.view.camera;
-        let own = (
-            camera.width.saturating_mul(drawn.view.arrangement.columns()).min(width),
-            camera.height.min(height),
-        );
-        let offset = [(width - own.0) / 2, (height - own.1) / 2];
-        #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
-        let place = [offset[0] as f32, offset[1] as f32, own.0 as f32, own.1 as f32];
-        place
-    }
-
     /// Returns the picture shown, in memory.
     pub(super) async fn picture(&mut self, drawn: &Drawn) -> Result<Rgb8Image> {
         let gpu = &self.gpu;
         let composer =
             self.composer.get_or_insert_with(|| Composer::new(gpu.device().clone(), gpu.queue().clone()));
         composer.compose_async(&composition(drawn)).await.map_err(|e| e.to_string())
+    }
+
+    /// Returns the `GPUDevice` of the browser.
+    pub(super) fn device(&self) -> Option<&JsValue> {
+        self.gpu.device().as_webgpu().map(AsRef::as_ref)
     }
 
     pub(super) fn device_name(&self) -> &str {
@@ -251,11 +202,4 @@ impl Screen {
 
 fn composition(drawn: &Drawn) -> Composition {
     Composition { arrangement: drawn.view.arrangement, pictures: drawn.pictures.clone() }
-}
-
-/// Returns `camera` with both sides of its picture multiplied by `scale`.
-fn scaled(camera: &Camera, scale: f64) -> Camera {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most the width")]
-    let width = (f64::from(camera.width) * scale).round() as u32;
-    camera.with_max_width(width)
 }
