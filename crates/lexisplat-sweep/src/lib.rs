@@ -49,7 +49,7 @@ pub use manifest::{Entry, parse_manifest, read_manifest};
 pub use options::{SweepOptions, SweepProgress};
 pub use picture::PictureFiles;
 pub use results::{Fps, Method, Point, Results, SceneResult, Setting, Skipped};
-pub use scene::shown_path;
+pub use scene::{fingerprint, shown_path};
 pub use sweep::sweep;
 
 use lexisplat_eval::format::csv_cell;

@@ -383,8 +383,11 @@ pub(super) fn file_start(entry: &Entry) -> String {
     file_name(&format!("{dataset}{}-{}", entry.name, entry.method))
 }
 
-/// Returns the length and the checksum of a file, as text.
-fn fingerprint(path: &Path) -> Result<String> {
+/// Returns the length and the checksum (CRC-32) of a file, as text.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read.
+pub fn fingerprint(path: &Path) -> Result<String> {
     let bytes = Input::open(path)?;
     Ok(format!("{}:{:08x}", bytes.len(), crc32fast::hash(&bytes)))
 }

@@ -1,7 +1,7 @@
 //! `lexisplat sweep`.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
@@ -9,7 +9,8 @@ use lexisplat::{Progress, Stage};
 use lexisplat_compress::{DrawOptions, Error, SplitFilter};
 use lexisplat_eval::{Comparison, format};
 use lexisplat_sweep::{
-    Entry, Results, Setting, SweepOptions, SweepProgress, read_manifest, shown_path, sweep, write_report,
+    Entry, Results, Setting, SweepOptions, SweepProgress, fingerprint, read_manifest, shown_path, sweep,
+    write_report,
 };
 use serde::Serialize;
 
@@ -113,11 +114,18 @@ fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     options.pictures = args.pictures;
     options.resume = !args.fresh;
     options.outputs = outputs().clone();
-    for path in &args.measures.lpips {
-        let bytes = std::fs::metadata(path).map_err(|e| lexisplat::Error::io(path, e))?.len();
-        write!(options.fingerprint, "{} {bytes}; ", shown_path(path))?;
-    }
+    options.fingerprint = weights(&args.measures.lpips)?;
     Ok(options)
+}
+
+/// Returns a text that tells files of weights apart. Files of one network have the same size whatever weights they hold,
+/// so their checksums are in it.
+fn weights(files: &[PathBuf]) -> Result<String> {
+    let mut text = String::new();
+    for path in files {
+        write!(text, "{} {}; ", shown_path(path), fingerprint(path)?)?;
+    }
+    Ok(text)
 }
 
 /// Returns the command line without folders of this machine, for the report.
@@ -234,4 +242,25 @@ fn summary(folder: &Path, results: &Results, progress: &Shown) -> Result<String>
     writeln!(out, "{made} parts made, {reused} kept from before")?;
     writeln!(out, "wrote {}: report.html, all.csv, tables, figures", folder.display())?;
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_weights_of_the_same_name_and_size_are_told_apart() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = [folder.path().join("vgg.safetensors")];
+        let written = |bytes: &[u8]| {
+            std::fs::write(&files[0], bytes).unwrap();
+            weights(&files).unwrap()
+        };
+        let first = written(&[1, 2, 3]);
+        assert_ne!(written(&[1, 2, 4]), first);
+        assert_eq!(written(&[1, 2, 3]), first);
+        assert!(!first.contains(&folder.path().display().to_string()), "{first}");
+        std::fs::remove_file(&files[0]).unwrap();
+        assert!(weights(&files).unwrap_err().to_string().contains("vgg.safetensors"));
+    }
 }
