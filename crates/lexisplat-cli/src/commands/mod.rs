@@ -12,6 +12,7 @@ mod devices;
 mod eval;
 mod html;
 mod info;
+mod man;
 mod render;
 mod scores;
 mod sweep;
@@ -63,6 +64,7 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Devices(_) => devices::run(&common),
         Command::Demo(args) => demo::run(&args, &common),
         Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
     })
 }
 
