@@ -50,7 +50,7 @@ function build(name) {
   const cargo = ['build', '--locked', '--profile', 'wasm', '--target', 'wasm32-unknown-unknown', '-p', 'lexisplat-web', '--lib'];
   cargo.push('--manifest-path', join(root, 'Cargo.toml'), '--target-dir', target, '--no-default-features');
   cargo.push('--features', features.join(','), ...more);
-  run('cargo', cargo, { RUSTFLAGS: FEATURES });
+  run('cargo', cargo, { RUSTFLAGS: `${FEATURES} ${process.env.RUSTFLAGS ?? ''}`.trim() });
   const built = join(target, 'wasm32-unknown-unknown/wasm/lexisplat_web.wasm');
   const folder = join(web, 'wasm');
   mkdirSync(folder, { recursive: true });

@@ -362,3 +362,15 @@ fn quiet_is_silent_and_completions_are_not() {
         assert!(folder.run(&["completions", shell]).contains("lexisplat"), "{shell}");
     }
 }
+
+#[test]
+fn the_program_and_each_command_have_a_manual_page() {
+    let folder = Folder::few();
+    let program = folder.run(&["man"]);
+    // Roff writes a hyphen as \\-.
+    assert!(program.contains(".TH lexisplat 1") && program.contains(r"lexisplat\-compress(1)"), "{program}");
+    let page = folder.run(&["man", "compress"]);
+    assert!(page.contains(".TH lexisplat-compress 1") && page.contains(r"\-\-psnr"), "{page}");
+    let error = folder.fail(&["man", "knit"], 5);
+    assert!(error.contains("command = knit") && error.contains("decompress"), "{error}");
+}

@@ -326,9 +326,7 @@ impl FirstView {
             None => Ok(Self::Given(None)),
             Some(link) => match Pose::from_link(link) {
                 Some(pose) => Ok(Self::Given(Some(pose))),
-                None => {
-                    Err(Error::parameter("view", link, "'auto', a link that a viewer copied, or None").into())
-                }
+                None => Err(Error::parameter("view", link, "'auto', a link that a viewer copied, or None")),
             },
         }
     }

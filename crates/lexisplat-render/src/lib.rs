@@ -29,7 +29,7 @@
 //! ```
 //!
 //! [`render`] draws on the processor, with the same bits on every machine. With the feature `gpu` (on by default) the module `gpu`
-//! draws the same pictures through Vulkan, Metal, DX12 or, in a browser, WebGPU. [`Renderer`] is one interface to both: start
+//! draws the same pictures through Vulkan, Metal, DX12 or, in a browser, WebGPU. Without it the module finds no GPU. [`Renderer`] is one interface to both: start
 //! there to draw many views. Methods of [`Renderer`] that may wait for a GPU are async. Each has a twin that blocks, outside of
 //! browsers.
 //!
@@ -50,8 +50,9 @@ mod colmap;
 pub mod conventions;
 mod cpu;
 mod error;
-#[cfg(feature = "gpu")]
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 pub mod gpu;
+mod gpu_report;
 mod image;
 mod interior_views;
 mod json;
@@ -65,6 +66,7 @@ mod radiance;
 mod read_views;
 mod renderer;
 mod scene;
+mod sh_path;
 mod squared_error;
 mod subject;
 mod surround;

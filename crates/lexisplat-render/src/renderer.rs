@@ -104,12 +104,16 @@ impl Renderer {
     /// [`Error::Gpu`] if a GPU was asked for.
     #[cfg(not(feature = "gpu"))]
     pub fn open(device: Device) -> Result<Self> {
-        match device {
-            Device::Auto | Device::Cpu => Ok(Self::cpu()),
-            Device::Gpu | Device::Index(_) => {
-                Err(Error::Gpu { problem: "this program was built without its `gpu` feature".to_owned() })
-            }
-        }
+        device.open_gpu()?.map_or(Ok(Self::cpu()), |gpu| Self::on(&gpu))
+    }
+
+    /// Makes a renderer that draws on `gpu`, which does not exist without the feature `gpu`.
+    ///
+    /// # Errors
+    /// None in this build.
+    #[cfg(not(feature = "gpu"))]
+    pub fn on(gpu: &crate::gpu::Gpu) -> Result<Self> {
+        match *gpu {}
     }
 
     /// Makes a renderer that draws on `gpu`.

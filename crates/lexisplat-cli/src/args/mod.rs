@@ -93,6 +93,7 @@ pub(crate) enum Command {
     Bench(Bench),
     Demo(Demo),
     Completions(Completions),
+    Man(Man),
 }
 
 impl Command {
@@ -148,6 +149,13 @@ pub(crate) struct Completions {
     /// The shell to print completions for.
     #[arg(value_enum)]
     pub(crate) shell: clap_complete::Shell,
+}
+
+/// Print the manual page of this program, or of one of its commands, in roff. `lexisplat man | man -l -` shows it.
+#[derive(Debug, Args)]
+pub(crate) struct Man {
+    /// The command to print the page of.
+    pub(crate) command: Option<String>,
 }
 
 /// Parses the command line of this process.

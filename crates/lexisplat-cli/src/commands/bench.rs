@@ -28,7 +28,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     let views = &args.views;
     let cameras = super::cameras(views, &scene)?;
     let gpu = open_gpu(views.device)?;
-    if gpu.is_none() && views.device == Device::Auto {
+    if cfg!(feature = "gpu") && gpu.is_none() && views.device == Device::Auto {
         note(
             "warning: the only GPU is emulated in software, so only the CPU is measured; --device gpu measures it too",
         );

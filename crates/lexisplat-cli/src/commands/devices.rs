@@ -18,6 +18,9 @@ pub(crate) fn run(common: &Common) -> Result<()> {
         let processor = json!({ "simd": simd, "available": available });
         return print_json(&json!({ "devices": found, "processor": processor }));
     }
+    if !cfg!(feature = "gpu") {
+        return print(&format!("cpu  the CPU ({simd}); this program was built without drawing on GPUs\n"));
+    }
     if found.is_empty() {
         return print(&format!(
             "no GPU was found: everything is drawn on the CPU (cpu, {simd})\n\

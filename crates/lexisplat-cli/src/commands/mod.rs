@@ -13,6 +13,7 @@ mod eval;
 mod first_view;
 mod html;
 mod info;
+mod man;
 mod render;
 mod scores;
 mod sweep;
@@ -64,6 +65,7 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Devices(_) => devices::run(&common),
         Command::Demo(args) => demo::run(&args, &common),
         Command::Completions(args) => completions::run(&args),
+        Command::Man(args) => man::run(&args),
     })
 }
 

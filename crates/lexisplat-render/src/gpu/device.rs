@@ -8,29 +8,10 @@ use crate::renderer::Device;
 use crate::wait::answer;
 
 use super::counted::Counted;
+use crate::gpu_report::AdapterSummary;
 
 /// Advice for a machine without an adapter.
 const NO_ADAPTER: &str = "no GPU adapter was found; install a Vulkan driver and loader (Debian and Ubuntu: mesa-vulkan-drivers and libvulkan1), or draw with the CPU renderer";
-
-/// An adapter that this machine offers.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
-pub struct AdapterSummary {
-    /// Index in the list of adapters, best first. It is the number that [`Device::Index`] takes.
-    pub index: usize,
-    /// Name of the adapter, from the driver.
-    pub name: String,
-    /// Driver and version.
-    pub driver: String,
-    /// `Vulkan`, `Metal`, `Dx12` or `BrowserWebGpu`.
-    pub backend: String,
-    /// Whether the adapter is software on the processor, such as lavapipe.
-    pub software: bool,
-    /// Largest part of a buffer that a kernel can see at once, in bytes.
-    #[serde(rename = "max_binding_bytes")]
-    pub max_binding: u64,
-    /// Whether stages can be timed.
-    pub timestamps: bool,
-}
 
 /// An open GPU. Clones share the device.
 #[derive(Debug, Clone)]

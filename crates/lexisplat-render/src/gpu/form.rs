@@ -8,8 +8,8 @@ use crate::scene::Scene;
 use super::constants::vectors;
 use super::part::{word, words};
 use super::part_layout::{ShKind, ShLayout};
-use super::path::ShPath;
 use super::sh_data::{ShData, exact_row};
+use crate::sh_path::ShPath;
 
 /// First word of a form's bytes: `LXFM`.
 const MAGIC: u32 = u32::from_le_bytes(*b"LXFM");

@@ -34,7 +34,6 @@ mod part_check;
 mod part_layout;
 mod part_sample;
 mod part_scene;
-mod path;
 mod plan;
 mod radiance;
 mod radiance_table;
@@ -57,14 +56,15 @@ pub use wgpu;
 pub use buffer::OwnedBuffer;
 #[cfg(not(target_family = "wasm"))]
 pub use device::adapters;
-pub use device::{AdapterSummary, Gpu, adapters_async, rank};
+pub use device::{Gpu, adapters_async, rank};
 pub use form::SceneForm;
 pub use part::ScenePart;
 pub(crate) use part_scene::PartGaussians;
-pub use path::ShPath;
-pub use plan::DrawStage;
-pub use renderer::{Frame, FrameStats, GpuRenderer, StageTimes};
-pub use scene::{GpuScene, SceneBytes};
+pub use renderer::{Frame, GpuRenderer};
+pub use scene::GpuScene;
 #[cfg(not(target_family = "wasm"))]
 pub use speed::measure_speed;
-pub use speed::{Speed, measure_speed_async};
+pub use speed::measure_speed_async;
+
+pub use crate::gpu_report::{AdapterSummary, DrawStage, FrameStats, SceneBytes, Speed, StageTimes};
+pub use crate::sh_path::ShPath;

@@ -8,8 +8,8 @@ use crate::scene::Scene;
 
 use super::columns::{Columns, escapes_in};
 use super::part_layout::{HEADER_WORDS, Outline, Section, ShKind};
-use super::path::ShPath;
 use super::sh_data::{ShData, body, dense_row, exact_row, shape};
+use crate::sh_path::ShPath;
 
 /// A run of consecutive Gaussians with their arrays in the layout that kernels read, in one piece of memory.
 ///

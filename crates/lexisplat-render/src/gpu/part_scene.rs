@@ -12,7 +12,7 @@ use super::form::SceneForm;
 use super::part::{ScenePart, word, words};
 use super::part_layout::{Section, ShKind};
 use super::part_sample::{BODY, SHAPE, rows};
-use super::scene::SceneBytes;
+use crate::gpu_report::SceneBytes;
 
 /// Number of bytes of the place and the counts of a group of Gaussians.
 const GROUP_BYTES: usize = 4 * COLUMN_WORDS as usize;

@@ -4,6 +4,7 @@ use std::num::NonZeroU64;
 use std::sync::{Arc, Weak};
 
 use crate::error::Result;
+use crate::gpu_report::DrawStage;
 
 use super::buffer::Buffer;
 use super::capacity::PIXEL;
@@ -16,43 +17,6 @@ use super::uniforms::{Band, ChunkUniform, Pass, Scan};
 use super::work::Work;
 
 use crate::conventions::TILE;
-
-/// A stage of drawing, which is timed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum DrawStage {
-    /// Finds the Gaussians that may be visible.
-    Cull,
-    /// Projects these Gaussians to ellipses on screen.
-    Project,
-    /// Computes their colours.
-    Radiance,
-    /// Orders them by depth.
-    Sort,
-    /// Lists the Gaussians that may touch each tile.
-    Tiles,
-    /// Draws the pixels.
-    Blend,
-}
-
-impl DrawStage {
-    /// All stages, in the order they run.
-    pub const ALL: [Self; 6] =
-        [Self::Cull, Self::Project, Self::Radiance, Self::Sort, Self::Tiles, Self::Blend];
-
-    /// Returns the name of the stage in reports.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cull => "cull",
-            Self::Project => "project",
-            Self::Radiance => "radiance",
-            Self::Sort => "sort",
-            Self::Tiles => "tiles",
-            Self::Blend => "blend",
-        }
-    }
-}
 
 /// The properties of a picture that its plan depends on, besides the scene and the buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

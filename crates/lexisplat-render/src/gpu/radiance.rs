@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use super::constants::{atom_terms, dense_terms, float_terms, vectors};
 use super::device::Gpu;
 use super::part_layout::{ShKind, ShLayout};
-use super::path::ShPath;
 use super::shaders::{compile, pipeline};
+use crate::sh_path::ShPath;
 
 /// Number of bytes of workgroup memory that the shared path leaves to the compiler.
 const SHARED_RESERVE: usize = 64;

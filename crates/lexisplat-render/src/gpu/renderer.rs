@@ -13,13 +13,14 @@ use crate::image::Image;
 use super::capacity::{Capacity, ENTRY_ELEMENT, PIXEL, SLOT_ELEMENT};
 use super::constants::{COUNTERS, Counter};
 use super::device::Gpu;
-use super::path::ShPath;
-use super::plan::{DrawStage, Plan, Shape, Size, dimensions};
+use super::plan::{Plan, Shape, Size, dimensions};
 use super::scene::GpuScene;
 use super::shaders::{DRAWING, Kernels, kernels};
 use super::timestamps::Timestamps;
 use super::uniforms::FrameUniform;
 use super::work::Work;
+use crate::gpu_report::{DrawStage, FrameStats, StageTimes};
+use crate::sh_path::ShPath;
 
 /// Number of slots and entries that the first buffers hold.
 const FIRST_ROOM: u32 = 1 << 18;
@@ -47,29 +48,6 @@ pub struct Frame {
     pub height: u32,
     /// Measurements of the drawing.
     pub stats: FrameStats,
-}
-
-/// Duration of each stage, in milliseconds.
-pub type StageTimes = Vec<(DrawStage, f64)>;
-
-/// Measurements of drawing a picture.
-#[derive(Debug, Clone, PartialEq, Default)]
-#[non_exhaustive]
-pub struct FrameStats {
-    /// Number of Gaussians that passed the coarse test and were projected and coloured. If bands searched for their own
-    /// Gaussians: that number in the fullest band.
-    pub visible: u32,
-    /// Number of pairs of a Gaussian and a tile that it may touch.
-    pub entries: u32,
-    /// Number of bands of rows of tiles. It is above 1 if the lists do not fit at once.
-    pub bands: u32,
-    /// How often the picture was drawn again with larger buffers. It is above 0 only if the view is fuller than all views
-    /// before.
-    pub retries: u32,
-    /// Duration of each stage on the GPU, in milliseconds; empty if the GPU has no timestamps.
-    pub stages: StageTimes,
-    /// Time from the start of the first stage to the end of the last, in milliseconds.
-    pub total: Option<f64>,
 }
 
 /// Draws scenes on one GPU. Buffers are kept from picture to picture.

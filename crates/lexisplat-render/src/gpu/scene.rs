@@ -16,26 +16,18 @@ use super::device::Gpu;
 use super::form::SceneForm;
 use super::part::ScenePart;
 use super::part_layout::{ShKind, ShLayout};
-use super::path::ShPath;
 use super::radiance::radiance_pipeline;
 use super::radiance_table::RadianceTable;
 use super::sh_data::ShData;
 use super::uniforms::ChunkUniform;
+use crate::gpu_report::SceneBytes;
+use crate::sh_path::ShPath;
 
 /// Largest number of Gaussians of a part, when a whole scene is uploaded part by part. The arrays of one part are in
 /// memory at once.
 const PART_GAUSSIANS: usize = 1 << 20;
 /// Largest number of blocks of Gaussians of a scene. The numbers of their Gaussians fit in 32 bits.
 const MAX_BLOCKS: u32 = 1 << 24;
-
-/// Numbers of bytes of a scene on the GPU.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct SceneBytes {
-    /// Bytes of positions, shapes and opacities.
-    pub geometry: u64,
-    /// Bytes of everything that colours need: base colours, coefficients or codes, dictionary, table.
-    pub sh: u64,
-}
 
 /// A scene on the GPU for one [`ShPath`]. The scene from which it was made may be dropped.
 ///

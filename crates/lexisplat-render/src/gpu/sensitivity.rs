@@ -138,10 +138,10 @@ mod tests {
     use lexisplat::Silent;
     use lexisplat_sample::{SampleOptions, scene};
 
-    use super::super::path::ShPath;
     use super::super::tests::gpu;
     use super::*;
     use crate::scene::Scene;
+    use crate::sh_path::ShPath;
     use crate::surround::surround;
 
     /// Every sum goes on in the next band where it stopped in the one before.

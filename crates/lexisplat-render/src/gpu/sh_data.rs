@@ -10,7 +10,7 @@ use crate::scene::Scene;
 
 use super::constants::vectors;
 use super::part_layout::{ShKind, ShLayout};
-use super::path::ShPath;
+use crate::sh_path::ShPath;
 
 /// Smallest log scale. Smaller ones are raised to this, because their exponential is not a normal number.
 const LEAST_SCALE: f32 = -87.0;

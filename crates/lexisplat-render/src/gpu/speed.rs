@@ -3,22 +3,13 @@
 use web_time::Instant;
 
 use crate::error::Result;
+use crate::gpu_report::Speed;
 
 use super::constants::{GROUP, MULTIPLY_ADDS};
 use super::device::Gpu;
 use super::plan::dimensions;
 use super::shaders::{all_from, bind, compile, pipeline};
 use super::timestamps::Timestamps;
-
-/// Measured rates of a GPU.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct Speed {
-    /// Bytes read plus bytes written in a second, when arrays larger than any cache are copied.
-    pub copy: f64,
-    /// Single-precision operations in a second. A multiplication with an addition counts as two operations.
-    pub arithmetic: f64,
-}
 
 /// Number of bytes copied, or the size of a binding if that is smaller.
 const COPIED: u64 = 256 << 20;

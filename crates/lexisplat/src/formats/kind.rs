@@ -116,7 +116,7 @@ impl Unsupported {
             Self::Ksplat => ["a .ksplat file", CONVERT],
             Self::Pickle => [
                 "a Python pickle, which can run any code when it is read (EAGLES' point_cloud_compressed.pkl?)",
-                "it is never read here: load it where it was made and write a PLY, for EAGLES with \
+                "it is never read here: write a PLY where it was made; for EAGLES train with --save_ply, or use \
                  load_compressed_pkl and save_ply",
             ],
             Self::CompressedPly => ["a PlayCanvas compressed.ply", CONVERT],

@@ -5,12 +5,12 @@ use naga::valid::{Capabilities, FunctionInfo, ModuleInfo, ValidationFlags, Valid
 use naga::{AddressSpace, GlobalVariable, Module};
 
 use super::super::constants::declarations;
-use super::super::path::ShPath;
 use super::super::radiance::radiance_text;
 use super::super::sh_data::ShData;
 use super::super::shaders::{DRAWING, MEASURING};
 use super::made;
 use crate::scene::Scene;
+use crate::sh_path::ShPath;
 
 /// Capabilities of plain WebGPU; halves there are in packed pairs only.
 const PLAIN: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
