@@ -103,10 +103,10 @@ mod tests {
         let turn = glam::DQuat::from_rotation_arc(DVec3::Y, up);
         for i in 0..600_u16 {
             let t = f64::from(i);
-            g.positions.push([t.sin(), t.cos(), (0.7 * t).sin()].map(|v| v as f32));
+            g.positions.push([t.sin(), t.cos(), (0.7 * t).sin()].map(single));
             let any = glam::DQuat::from_euler(glam::EulerRot::XYZ, 1.7 * t, 2.3 * t, 0.9 * t);
             let q = if i % 2 == 0 { turn } else { any };
-            g.rotations.push([q.w, q.x, q.y, q.z].map(|v| v as f32));
+            g.rotations.push([q.w, q.x, q.y, q.z].map(single));
             g.scales.push([-3.0, -6.0, -3.0]);
             g.opacities.push(2.0);
         }
