@@ -3,20 +3,20 @@
 use std::borrow::Cow;
 
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, MAX_COEFFICIENTS, rest_basis};
-use lexisplat::{CodedRest, Dictionary, ShDegree, SparseCodes};
+use lexisplat::{CodedRest, Column, Dictionary, ShDegree, SparseCodes};
 
 use crate::scene::Scene;
 
 /// Number of independent sums of a dot product, so that additions need not wait for each other. The number decides how
 /// the result is rounded, so it is the same everywhere.
 const LANES: usize = 4;
-/// Number of channels of an interleaved atom: red, green, blue, and a zero that pads the register.
-const PADDED: usize = 4;
+/// Lengths of an atom in memory, for the degrees from 1 on: its values, and zeros up to whole registers.
+const PADDED: [usize; 4] = [16, 24, 48, 72];
 
 /// The view-dependent colours of a scene.
 ///
-/// Sparse codes are never expanded to dense SH. For each nonzero the three channels of the atom are multiplied with the
-/// basis, and only three sums are kept: `SH(sum_j a_j d_j) = sum_j a_j SH(d_j)`.
+/// A sparse code is expanded in registers, for the one Gaussian that is being coloured. Its colour has the same bits as that of
+/// the decompressed scene, since [`lexisplat::reconstruct`] adds the same values in the same order.
 #[derive(Debug)]
 pub struct Radiance<'a> {
     degree: ShDegree,
@@ -29,18 +29,18 @@ pub struct Radiance<'a> {
 #[derive(Debug)]
 enum Rest<'a> {
     Dense(&'a [f32]),
-    Sparse { codes: &'a SparseCodes, atoms: Cow<'a, [[f32; PADDED]]> },
+    Sparse { codes: &'a SparseCodes, atoms: Cow<'a, [f32]> },
 }
 
 /// The atoms of a dictionary as they are multiplied with a basis.
 #[cfg(feature = "gpu")]
 #[derive(Debug)]
-pub(crate) struct Atoms(Vec<[f32; PADDED]>);
+pub(crate) struct Atoms(Vec<f32>);
 
 #[cfg(feature = "gpu")]
 impl Atoms {
     pub(crate) fn of(dictionary: &Dictionary) -> Self {
-        Self(interleave(dictionary))
+        Self(padded(dictionary))
     }
 
     /// Returns the number of bytes in memory.
@@ -58,7 +58,7 @@ impl<'a> Radiance<'a> {
         let rest = match scene {
             Scene::Dense(splats) => Rest::Dense(&splats.sh_rest),
             Scene::Sparse(model) => {
-                Rest::Sparse { codes: model.codes(), atoms: Cow::Owned(interleave(model.dictionary())) }
+                Rest::Sparse { codes: model.codes(), atoms: Cow::Owned(padded(model.dictionary())) }
             }
         };
         let degree = scene.degree();
@@ -110,7 +110,7 @@ impl<'a> Radiance<'a> {
                 }
                 Rest::Sparse { codes, atoms } => match codes.row(i) {
                     CodedRest::Exact(row) => dense(row, per_channel, &basis),
-                    CodedRest::Code(column) => sparse(column.iter(), atoms, per_channel, &basis),
+                    CodedRest::Code(column) => sparse(column, atoms, per_channel, &basis),
                 },
             };
         }
@@ -154,52 +154,39 @@ fn dense_of<const N: usize>(row: &[f32], basis: &Basis) -> [f32; CHANNELS] {
     sums
 }
 
-/// Returns the dot products of a code: `sum_j value_j * (basis . atom_j)`.
+/// Returns the dot products of the three channels of a code's row with the basis.
 #[inline(always)]
-fn sparse(
-    code: impl Iterator<Item = (usize, f32)>,
-    atoms: &[[f32; PADDED]],
-    per_channel: usize,
-    basis: &Basis,
-) -> [f32; CHANNELS] {
-    let basis = &basis[..per_channel];
-    let mut sums = [0.0_f32; PADDED];
-    for (atom, value) in code {
-        let atom = &atoms[atom * per_channel..(atom + 1) * per_channel];
-        let mut even = [0.0_f32; PADDED];
-        let mut odd = [0.0_f32; PADDED];
-        let mut pairs = atom.chunks_exact(2).zip(basis.chunks_exact(2));
-        for (atom, b) in &mut pairs {
-            for c in 0..PADDED {
-                even[c] += b[0] * atom[0][c];
-                odd[c] += b[1] * atom[1][c];
-            }
-        }
-        if per_channel % 2 == 1 {
-            for c in 0..PADDED {
-                even[c] += basis[per_channel - 1] * atom[per_channel - 1][c];
-            }
-        }
-        for c in 0..PADDED {
-            sums[c] += value * (even[c] + odd[c]);
-        }
+fn sparse(code: Column<'_>, atoms: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
+    match per_channel {
+        3 => dense_of::<3>(&sum::<{ PADDED[0] }>(code, atoms), basis),
+        8 => dense_of::<8>(&sum::<{ PADDED[1] }>(code, atoms), basis),
+        15 => dense_of::<15>(&sum::<{ PADDED[2] }>(code, atoms), basis),
+        24 => dense_of::<24>(&sum::<{ PADDED[3] }>(code, atoms), basis),
+        _ => [0.0; CHANNELS],
     }
-    [sums[0], sums[1], sums[2]]
 }
 
-/// Returns the atoms with the channels of each coefficient side by side.
-fn interleave(dictionary: &Dictionary) -> Vec<[f32; PADDED]> {
-    let per_channel = dictionary.degree().rest_per_channel();
-    let mut atoms = Vec::with_capacity(dictionary.len() * per_channel);
-    for j in 0..dictionary.len() {
-        let atom = dictionary.atom(j);
-        atoms.extend((0..per_channel).map(|k| {
-            let mut coefficient = [0.0; PADDED];
-            for (c, value) in coefficient.iter_mut().take(CHANNELS).enumerate() {
-                *value = atom[c * per_channel + k];
-            }
-            coefficient
-        }));
+/// Returns the sum of `value * atom` over the nonzeros of a code. The sums of all coefficients are independent of each other.
+#[inline(always)]
+fn sum<const N: usize>(code: Column<'_>, atoms: &[f32]) -> [f32; N] {
+    let atoms = atoms.as_chunks::<N>().0;
+    let mut sums = [0.0_f32; N];
+    code.each(|atom, value| {
+        for (sum, coefficient) in sums.iter_mut().zip(&atoms[atom]) {
+            *sum += value * coefficient;
+        }
+    });
+    sums
+}
+
+/// Returns the atoms, each filled up to its length in [`PADDED`].
+fn padded(dictionary: &Dictionary) -> Vec<f32> {
+    let Some(length) = usize::from(dictionary.degree().get()).checked_sub(1).map(|k| PADDED[k]) else {
+        return Vec::new();
+    };
+    let mut atoms = vec![0.0; dictionary.len() * length];
+    for (j, row) in atoms.chunks_exact_mut(length).enumerate() {
+        row[..dictionary.dim()].copy_from_slice(dictionary.atom(j));
     }
     atoms
 }

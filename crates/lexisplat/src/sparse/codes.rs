@@ -235,6 +235,40 @@ impl<'a> Column<'a> {
         let codes = self.codes;
         (self.start..self.start + self.len).map(move |k| (codes.indices.get(k), codes.values.get(k)))
     }
+
+    /// Calls `take` with each atom and value, by ascending atom. It is faster than [`Self::iter`], since the types of indices and
+    /// values are looked up once.
+    #[inline(always)]
+    pub fn each(&self, take: impl FnMut(usize, f32)) {
+        fn all<I: Copy, V: Copy>(
+            (indices, values): (&[I], &[V]),
+            index: impl Fn(I) -> usize,
+            value: impl Fn(V) -> f32,
+            mut take: impl FnMut(usize, f32),
+        ) {
+            indices.iter().zip(values).for_each(|(&i, &v)| take(index(i), value(v)));
+        }
+        let own = self.start..self.start + self.len;
+        match (&self.codes.indices, &self.codes.values) {
+            (Indices::U8(i), Values::F16(v)) => all((&i[own.clone()], &v[own]), usize::from, widened, take),
+            (Indices::U8(i), Values::F32(v)) => all((&i[own.clone()], &v[own]), usize::from, |v| v, take),
+            (Indices::U16(i), Values::F16(v)) => all((&i[own.clone()], &v[own]), usize::from, widened, take),
+            (Indices::U16(i), Values::F32(v)) => all((&i[own.clone()], &v[own]), usize::from, |v| v, take),
+        }
+    }
+}
+
+/// Returns a finite half as a single, which has the same value. `f16::to_f32` looks up the processor's instructions at each call.
+#[inline(always)]
+fn widened(half: f16) -> f32 {
+    /// Bits by which the fraction of a single is longer.
+    const LONGER: u32 = 13;
+    /// 2 to the power of the difference of the biases of the two exponents, 127 - 15. The exponent of a single begins at bit 23.
+    const BIAS: f32 = f32::from_bits((127 + 127 - 15) << 23);
+    let bits = u32::from(half.to_bits());
+    // The product is exact, also that of a subnormal half, whose bits are a subnormal single.
+    let size = f32::from_bits((bits & 0x7fff) << LONGER) * BIAS;
+    f32::from_bits(size.to_bits() | (bits & 0x8000) << 16)
 }
 
 impl SparseCodes {
