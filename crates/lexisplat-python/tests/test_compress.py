@@ -20,6 +20,10 @@ import pytest
 from conftest import make, of_inria
 
 
+#: A first view, as a link of a viewer has it.
+VIEW = "0.5:-1:-4:0:0:0:1:4:1.25"
+
+
 @pytest.mark.parametrize(
     ("arguments", "options"),
     [
@@ -31,7 +35,7 @@ from conftest import make, of_inria
         (["--tol", "0.05"], {"tol": 0.05}),
         (["--layout", "paper", "--pursuit", "omp"], {"layout": "paper", "pursuit": "omp"}),
         (["--max-nonzeros", "3"], {"max_nonzeros": 3}),
-        (["--views", "object"], {"views": "object"}),
+        (["--views", "object", "--view", VIEW], {"views": "object", "view": VIEW}),
     ],
 )
 def test_the_bytes_are_those_of_the_program(
@@ -48,6 +52,14 @@ def test_the_bytes_are_those_of_the_program(
     assert lx.compress(path, **options).to_bytes() == by_program
     if "ratio" not in options:
         assert lx.compress(lx.load(path), **options).to_bytes() == by_program
+
+
+def test_the_first_view_is_chosen_given_or_none(splats: lx.Splats) -> None:
+    assert lx.compress(splats, tol=0.2).view is not None
+    assert lx.compress(splats, tol=0.2, view=f"https://a.b/#view={VIEW}&mode=first").view == VIEW
+    assert lx.compress(splats, tol=0.2, view=None).view is None
+    with pytest.raises(lx.ParameterError, match="view"):
+        lx.compress(splats, tol=0.2, view="1:2:3")
 
 
 def test_a_scene_tells_of_itself(packed: lx.Scene, splats: lx.Splats) -> None:

@@ -16,7 +16,7 @@ impl State {
     /// chosen; `mode=`; `split=` of a wipe or `gain=` of a difference; `degree=`; and `background=`. All characters are
     /// allowed in the fragment of an address.
     ///
-    /// The camera is rounded as described at [`Pose`](crate::Pose). The other numbers are exact. If the text is applied
+    /// The camera is rounded as described at [`Pose`](lexisplat_render::Pose). The other numbers are exact. If the text is applied
     /// to a state with the same models and cameras, it gives the same view, and the link of this view is the same text.
     #[must_use]
     pub fn link(&self) -> String {
