@@ -457,3 +457,15 @@ impl SparseCodes {
 pub fn reconstruct(dictionary: &Dictionary, code: impl Iterator<Item = (usize, f32)>, out: &mut [f32]) {
     dictionary.atoms().reconstruct(code, out);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_finite_half_is_widened_to_its_value() {
+        for half in (0..=u16::MAX).map(f16::from_bits).filter(|half| half.is_finite()) {
+            assert_eq!(widened(half).to_bits(), half.to_f32().to_bits(), "{half}");
+        }
+    }
+}
