@@ -258,6 +258,16 @@ impl<'a> Column<'a> {
     }
 }
 
+/// Returns the sum of the first `number` counts. All are looked at, so that the loop has no branches and a known length.
+#[inline(always)]
+fn first_of(counts: &[u8; GAUSSIANS_PER_CHECKPOINT], number: usize) -> usize {
+    let number = u8::try_from(number).unwrap_or(u8::MAX);
+    // A count is at most 72, the length of an atom of degree 4, so that 16 bits hold the sum.
+    let sum: u16 =
+        (0_u8..).zip(counts).map(|(k, &count)| if k < number { u16::from(count) } else { 0 }).sum();
+    usize::from(sum)
+}
+
 /// Returns a finite half as a single, which has the same value. `f16::to_f32` looks up the processor's instructions at each call.
 #[inline(always)]
 fn widened(half: f16) -> f32 {
@@ -420,7 +430,7 @@ impl SparseCodes {
     /// # Panics
     /// If `i` is not below [`Self::len`].
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn row(&self, i: usize) -> CodedRest<'_> {
         let len = usize::from(self.counts[i]);
         if len == 0 && !self.escapes.gaussians.is_empty() {
@@ -429,9 +439,11 @@ impl SparseCodes {
                 return CodedRest::Exact(&self.escapes.rows[k * self.dim..(k + 1) * self.dim]);
             }
         }
-        let block = i / GAUSSIANS_PER_CHECKPOINT;
-        let before: usize =
-            self.counts[block * GAUSSIANS_PER_CHECKPOINT..i].iter().map(|&c| usize::from(c)).sum();
+        let (block, within) = (i / GAUSSIANS_PER_CHECKPOINT, i % GAUSSIANS_PER_CHECKPOINT);
+        let before = match self.counts.as_chunks::<GAUSSIANS_PER_CHECKPOINT>().0.get(block) {
+            Some(counts) => first_of(counts, within),
+            None => self.counts[i - within..i].iter().map(|&c| usize::from(c)).sum(),
+        };
         #[expect(clippy::cast_possible_truncation, reason = "bounded by a Vec's length")]
         let start = self.checkpoints[block] as usize + before;
         CodedRest::Code(Column { codes: self, start, len })
