@@ -111,53 +111,80 @@ struct Sample {
     entries: f64,
 }
 
-/// Draws from every camera. `frame` draws one frame.
+/// The samples of one path.
+#[derive(Default)]
+struct Samples {
+    all: Vec<f64>,
+    stages: BTreeMap<String, Vec<f64>>,
+    views: BTreeMap<String, Spread>,
+    /// Sum over views of the mean duration of a frame.
+    means: f64,
+    visible: f64,
+    entries: f64,
+}
+
+impl Samples {
+    fn add(&mut self, view: &str, samples: Vec<Sample>) {
+        let times: Vec<f64> = samples.iter().map(|sample| sample.total).collect();
+        for sample in samples {
+            for (name, time) in sample.stages {
+                self.stages.entry(name).or_default().push(time);
+            }
+            self.visible += sample.visible;
+            self.entries += sample.entries;
+        }
+        self.means += times.iter().sum::<f64>() / times.len() as f64;
+        self.all.extend_from_slice(&times);
+        self.views.insert(view.to_owned(), Spread::of(times));
+    }
+
+    fn times(self, path: &str) -> PathTimes {
+        let frames = self.all.len() as f64;
+        PathTimes {
+            path: path.to_owned(),
+            frame: Spread::of(self.all),
+            fps: 1e3 * self.views.len() as f64 / self.means,
+            stages: self.stages.into_iter().map(|(name, times)| (name, Spread::of(times))).collect(),
+            views: self.views,
+            visible: self.visible / frames,
+            entries: self.entries / frames,
+            ..PathTimes::default()
+        }
+    }
+}
+
+/// Draws each of `paths` from every camera, one frame of each path in turn. `frame` draws one frame of the path of the given
+/// number.
 fn run(
-    path: &str,
+    paths: &[&str],
     cameras: &[Camera],
     options: &BenchOptions,
     progress: &dyn Progress,
-    mut frame: impl FnMut(&Camera) -> Result<Sample>,
-) -> Result<PathTimes> {
+    mut frame: impl FnMut(usize, &Camera) -> Result<Sample>,
+) -> Result<Vec<PathTimes>> {
     if cameras.is_empty() {
         return Err(Error::parameter("cameras", "none", "at least one view"));
     }
-    let mut all = Vec::new();
-    let mut stages: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    let mut views = BTreeMap::new();
-    let (mut means, mut visible, mut entries) = (0.0, 0.0, 0.0);
+    let mut all: Vec<Samples> = paths.iter().map(|_| Samples::default()).collect();
     progress.begin(Stage::Draw, cameras.len() as u64);
     for camera in cameras {
         progress.check()?;
-        for _ in 0..options.warmup {
-            frame(camera)?;
-        }
-        let mut times = Vec::new();
-        for _ in 0..options.repeat.max(1) {
-            let sample = frame(camera)?;
-            times.push(sample.total);
-            for (name, time) in sample.stages {
-                stages.entry(name).or_default().push(time);
+        let mut samples: Vec<Vec<Sample>> = paths.iter().map(|_| Vec::new()).collect();
+        for number in 0..options.warmup + options.repeat.max(1) {
+            for (path, samples) in samples.iter_mut().enumerate() {
+                let sample = frame(path, camera)?;
+                if number >= options.warmup {
+                    samples.push(sample);
+                }
             }
-            (visible, entries) = (visible + sample.visible, entries + sample.entries);
         }
-        means += times.iter().sum::<f64>() / times.len() as f64;
-        all.extend_from_slice(&times);
-        views.insert(camera.name.clone(), Spread::of(times));
+        for (all, samples) in all.iter_mut().zip(samples) {
+            all.add(&camera.name, samples);
+        }
         progress.advance(1);
     }
     progress.end();
-    let frames = all.len() as f64;
-    Ok(PathTimes {
-        path: path.to_owned(),
-        frame: Spread::of(all),
-        fps: 1e3 * cameras.len() as f64 / means,
-        stages: stages.into_iter().map(|(name, times)| (name, Spread::of(times))).collect(),
-        views,
-        visible: visible / frames,
-        entries: entries / frames,
-        ..PathTimes::default()
-    })
+    Ok(all.into_iter().zip(paths).map(|(samples, path)| samples.times(path)).collect())
 }
 
 /// Times drawing on `gpu` with the scene held by `path`. Reports [`Stage::Draw`] to `progress`, in views.
@@ -176,7 +203,7 @@ pub fn bench_gpu(
     let mut renderer = GpuRenderer::new(gpu)?;
     let uploaded = GpuScene::new(gpu, scene, path)?;
     let drawing = RenderOptions::default().with_background(options.background);
-    let times = run(path.name(), cameras, options, progress, |camera| {
+    let times = run(&[path.name()], cameras, options, progress, |_, camera| {
         let clock = Instant::now();
         let stats = renderer.draw(&uploaded, camera, &drawing)?.stats;
         let wall = clock.elapsed().as_secs_f64() * 1e3;
@@ -188,37 +215,40 @@ pub fn bench_gpu(
         })
     })?;
     let bytes = uploaded.bytes();
-    Ok(PathTimes {
+    let with_bytes = |times: PathTimes| PathTimes {
         geometry_bytes: bytes.geometry,
         sh_bytes: bytes.sh,
         shading_bytes: uploaded.shading_bytes(),
         shading_bytes_per_frame: times.visible * uploaded.shading_bytes(),
         geometry_bytes_per_frame: uploaded.looking_bytes(times.visible),
         ..times
-    })
+    };
+    Ok(times.into_iter().map(with_bytes).next().unwrap_or_default())
 }
 
-/// Times drawing on the processor. Reports [`Stage::Draw`] to `progress`, in views.
+/// Times drawing on the processor, one frame of each scene in turn, so that what else the machine does slows all of them alike.
+/// Reports [`Stage::Draw`] to `progress`, in views.
 ///
 /// # Errors
 /// [`Error::Parameter`] without cameras, or if a camera is not valid. [`Error::Codec`] if `progress` cancels.
 pub fn bench_cpu(
-    scene: &Scene<'_>,
+    scenes: &[Scene<'_>],
     cameras: &[Camera],
     options: &BenchOptions,
     progress: &dyn Progress,
-) -> Result<PathTimes> {
+) -> Result<Vec<PathTimes>> {
     let drawing = RenderOptions::default().with_background(options.background);
-    let (path, sh_bytes) = match scene {
+    let held = |scene: &Scene<'_>| match scene {
         Scene::Dense(splats) => {
             let dc = size_of_val(splats.geometry.dc.as_slice());
             ("cpu-dense", dc + size_of_val(splats.sh_rest.as_slice()))
         }
         Scene::Sparse(model) => ("cpu-sparse", model.resident_sh_bytes()),
     };
-    let times = run(path, cameras, options, progress, |camera| {
+    let names: Vec<&str> = scenes.iter().map(|scene| held(scene).0).collect();
+    let times = run(&names, cameras, options, progress, |path, camera| {
         let clock = Instant::now();
-        let drawn = render_measured(scene, camera, &drawing)?;
+        let drawn = render_measured(&scenes[path], camera, &drawing)?;
         Ok(Sample {
             total: clock.elapsed().as_secs_f64() * 1e3,
             stages: drawn.stage_times.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),
@@ -228,7 +258,12 @@ pub fn bench_cpu(
     })?;
     // Positions, opacities, scales, rotations.
     let each = size_of::<[f32; 11]>();
-    Ok(PathTimes { geometry_bytes: (scene.len() * each) as u64, sh_bytes: sh_bytes as u64, ..times })
+    let with_bytes = |(times, scene): (PathTimes, &Scene<'_>)| PathTimes {
+        geometry_bytes: (scene.len() * each) as u64,
+        sh_bytes: held(scene).1 as u64,
+        ..times
+    };
+    Ok(times.into_iter().zip(scenes).map(with_bytes).collect())
 }
 
 /// The paper's model of the time to shade Gaussians, with the measured rates of a GPU.
@@ -307,14 +342,22 @@ mod tests {
     fn the_processor_is_measured_by_stage() {
         let splats = scene(&SampleOptions::new(500, 1));
         let cameras = orbit(&splats.geometry, 3, 64, 48);
-        let times = bench_cpu(&Scene::from(&splats), &cameras, &BenchOptions::new(1, 4), &Silent).unwrap();
+        let (model, _) = compress(splats.clone(), &CompressOptions::default(), &Silent).unwrap();
+        let scenes = [Scene::from(&splats), Scene::from(&model)];
+        let all = bench_cpu(&scenes, &cameras, &BenchOptions::new(1, 4), &Silent).unwrap();
+        assert_eq!(
+            all.iter().map(|times| times.path.as_str()).collect::<Vec<_>>(),
+            ["cpu-dense", "cpu-sparse"]
+        );
+        assert!(all[1].sh_bytes < all[0].sh_bytes);
+        let times = &all[0];
         assert_eq!(times.views.len(), 3);
         assert_eq!(times.sh_bytes, 500 * 192);
         assert!(times.visible > 10.0 && times.visible <= 500.0);
         assert!(times.frame.p10 <= times.frame.median && times.frame.median <= times.frame.p90);
         let stages: f64 = times.stages.values().map(|spread| spread.median).sum();
         assert!(stages > 0.0 && times.fps > 0.0);
-        assert!(bench_cpu(&Scene::from(&splats), &[], &BenchOptions::new(0, 1), &Silent).is_err());
+        assert!(bench_cpu(&scenes, &[], &BenchOptions::new(0, 1), &Silent).is_err());
     }
 
     #[test]

@@ -2,21 +2,22 @@
 
 use std::borrow::Cow;
 
+use glam::Vec4;
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, MAX_COEFFICIENTS, rest_basis};
-use lexisplat::{CodedRest, Dictionary, ShDegree, SparseCodes};
+use lexisplat::{CodedRest, Column, Dictionary, ShDegree, SparseCodes};
 
 use crate::scene::Scene;
 
 /// Number of independent sums of a dot product, so that additions need not wait for each other. The number decides how
 /// the result is rounded, so it is the same everywhere.
 const LANES: usize = 4;
-/// Number of channels of an interleaved atom: red, green, blue, and a zero that pads the register.
+/// Number of values of a coefficient of an atom in memory: one for each channel, and a zero, so that they fill a register.
 const PADDED: usize = 4;
 
 /// The view-dependent colours of a scene.
 ///
-/// Sparse codes are never expanded to dense SH. For each nonzero the three channels of the atom are multiplied with the
-/// basis, and only three sums are kept: `SH(sum_j a_j d_j) = sum_j a_j SH(d_j)`.
+/// A sparse code is expanded in registers, for the one Gaussian that is being coloured. Its colour has the same bits as that of
+/// the decompressed scene, since [`lexisplat::reconstruct`] adds the same values in the same order.
 #[derive(Debug)]
 pub struct Radiance<'a> {
     degree: ShDegree,
@@ -29,18 +30,18 @@ pub struct Radiance<'a> {
 #[derive(Debug)]
 enum Rest<'a> {
     Dense(&'a [f32]),
-    Sparse { codes: &'a SparseCodes, atoms: Cow<'a, [[f32; PADDED]]> },
+    Sparse { codes: &'a SparseCodes, atoms: Cow<'a, [f32]> },
 }
 
 /// The atoms of a dictionary as they are multiplied with a basis.
 #[cfg(feature = "gpu")]
 #[derive(Debug)]
-pub(crate) struct Atoms(Vec<[f32; PADDED]>);
+pub(crate) struct Atoms(Vec<f32>);
 
 #[cfg(feature = "gpu")]
 impl Atoms {
     pub(crate) fn of(dictionary: &Dictionary) -> Self {
-        Self(interleave(dictionary))
+        Self(padded(dictionary))
     }
 
     /// Returns the number of bytes in memory.
@@ -58,7 +59,7 @@ impl<'a> Radiance<'a> {
         let rest = match scene {
             Scene::Dense(splats) => Rest::Dense(&splats.sh_rest),
             Scene::Sparse(model) => {
-                Rest::Sparse { codes: model.codes(), atoms: Cow::Owned(interleave(model.dictionary())) }
+                Rest::Sparse { codes: model.codes(), atoms: Cow::Owned(padded(model.dictionary())) }
             }
         };
         let degree = scene.degree();
@@ -96,110 +97,162 @@ impl<'a> Radiance<'a> {
     /// # Panics
     /// If the scene has no Gaussian `i`.
     #[must_use]
-    #[inline(always)]
     pub fn colour(&self, i: usize, direction: [f32; 3]) -> [f32; 3] {
-        let per_channel = self.degree.rest_per_channel();
-        let mut rest = [0.0; CHANNELS];
-        if self.shown.rest_per_channel() > 0 {
-            // The basis is zero above the evaluated degree, which leaves those bands out.
-            let basis = rest_basis(self.shown, direction);
-            rest = match &self.rest {
-                Rest::Dense(all) => {
-                    let dim = self.degree.rest();
-                    dense(&all[i * dim..(i + 1) * dim], per_channel, &basis)
-                }
-                Rest::Sparse { codes, atoms } => match codes.row(i) {
-                    CodedRest::Exact(row) => dense(row, per_channel, &basis),
-                    CodedRest::Code(column) => sparse(column.iter(), atoms, per_channel, &basis),
-                },
-            };
+        let mut only = [(i, direction)];
+        self.colours(&mut only, |&seen| seen, |only, colour| only.1 = colour);
+        only[0].1
+    }
+
+    /// Gives each of `items` its [`Self::colour`]. `seen` returns the Gaussian of an item and the direction to it.
+    ///
+    /// # Panics
+    /// If the scene does not have a Gaussian that `seen` returns.
+    #[inline(always)]
+    pub(crate) fn colours<T>(
+        &self,
+        items: &mut [T],
+        seen: impl Fn(&T) -> (usize, [f32; 3]),
+        set: impl Fn(&mut T, [f32; 3]),
+    ) {
+        if self.shown.rest_per_channel() == 0 {
+            return self.each(items, seen, set, |_, _| [0.0; CHANNELS]);
         }
-        std::array::from_fn(|c| {
-            let sum = COLOUR_OFFSET + C0 * self.dc[i][c] + rest[c];
-            if sum.is_finite() { sum.max(0.0) } else { f32::NAN }
-        })
+        // With a number of coefficients that the compiler knows, the loops over them become a few vector instructions.
+        match self.degree.rest_per_channel() {
+            3 => self.colours_of::<T, 3, { 3 * PADDED }>(items, seen, set),
+            8 => self.colours_of::<T, 8, { 8 * PADDED }>(items, seen, set),
+            15 => self.colours_of::<T, 15, { 15 * PADDED }>(items, seen, set),
+            _ => self.colours_of::<T, 24, { 24 * PADDED }>(items, seen, set),
+        }
     }
-}
 
-/// Returns the dot products of the three channels of a channel-major row with the basis.
-#[inline(always)]
-fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
-    // With a number of coefficients that the compiler knows, the loops become a few vector instructions.
-    match per_channel {
-        3 => dense_of::<3>(row, basis),
-        8 => dense_of::<8>(row, basis),
-        15 => dense_of::<15>(row, basis),
-        24 => dense_of::<24>(row, basis),
-        _ => [0.0; CHANNELS],
-    }
-}
-
-/// Returns the result of [`dense`] for `N` coefficients a channel.
-#[inline(always)]
-fn dense_of<const N: usize>(row: &[f32], basis: &Basis) -> [f32; CHANNELS] {
-    let mut sums = [0.0; CHANNELS];
-    for (sum, channel) in sums.iter_mut().zip(row.as_chunks::<N>().0) {
-        let mut lanes = [0.0_f32; LANES];
-        let products: [f32; N] = std::array::from_fn(|k| channel[k] * basis[k]);
-        for k in 0..N / LANES {
-            for lane in 0..LANES {
-                lanes[lane] += products[k * LANES + lane];
+    /// Does the work of [`Self::colours`] for `N` coefficients a channel, for which an atom takes `LEN` values in memory.
+    #[inline(always)]
+    fn colours_of<T, const N: usize, const LEN: usize>(
+        &self,
+        items: &mut [T],
+        seen: impl Fn(&T) -> (usize, [f32; 3]),
+        set: impl Fn(&mut T, [f32; 3]),
+    ) {
+        match &self.rest {
+            Rest::Dense(all) => {
+                let rows = all.as_chunks::<N>().0.as_chunks::<CHANNELS>().0;
+                self.each(
+                    items,
+                    seen,
+                    set,
+                    #[inline(always)]
+                    |i, basis| dense(&rows[i], basis),
+                );
+            }
+            Rest::Sparse { codes, atoms } => {
+                let atoms = atoms.as_chunks::<LEN>().0;
+                self.each(
+                    items,
+                    seen,
+                    set,
+                    #[inline(always)]
+                    |i, basis| match codes.row(i) {
+                        CodedRest::Code(column) => sparse::<N, LEN>(column, atoms, basis),
+                        CodedRest::Exact(row) => match row.as_chunks::<N>().0.as_chunks::<CHANNELS>().0 {
+                            [row, ..] => dense(row, basis),
+                            [] => [0.0; CHANNELS],
+                        },
+                    },
+                );
             }
         }
-        for lane in 0..N % LANES {
-            lanes[lane] += products[N / LANES * LANES + lane];
+    }
+
+    /// Colours `items`. `rest` returns the sum over all bands but the first for a Gaussian and a basis. The basis is zero above the
+    /// evaluated degree, which leaves those bands out.
+    #[inline(always)]
+    fn each<T>(
+        &self,
+        items: &mut [T],
+        seen: impl Fn(&T) -> (usize, [f32; 3]),
+        set: impl Fn(&mut T, [f32; 3]),
+        rest: impl Fn(usize, &Basis) -> [f32; CHANNELS],
+    ) {
+        for item in items {
+            let (i, direction) = seen(item);
+            let rest = rest(i, &rest_basis(self.shown, direction));
+            let colour = std::array::from_fn(|c| {
+                let sum = COLOUR_OFFSET + C0 * self.dc[i][c] + rest[c];
+                if sum.is_finite() { sum.max(0.0) } else { f32::NAN }
+            });
+            set(item, colour);
         }
-        *sum = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+    }
+}
+
+/// Returns the dot products of the three channels of a row with the basis.
+#[inline(always)]
+fn dense<const N: usize>(row: &[[f32; N]; CHANNELS], basis: &Basis) -> [f32; CHANNELS] {
+    // Registers are spelled out. From plain arrays the compiler makes one vector of the three channels, which it gathers
+    // from memory one by one.
+    let (basis, basis_end) = basis[..N].as_chunks::<LANES>();
+    let basis_end = filled(basis_end);
+    let mut sums = [0.0; CHANNELS];
+    for (sum, channel) in sums.iter_mut().zip(row) {
+        let (channel, end) = channel.as_chunks::<LANES>();
+        let mut lanes = Vec4::ZERO;
+        for (own, basis) in channel.iter().zip(basis) {
+            lanes += Vec4::from_array(*own) * Vec4::from_array(*basis);
+        }
+        if !end.is_empty() {
+            lanes += filled(end) * basis_end;
+        }
+        *sum = (lanes.x + lanes.y) + (lanes.z + lanes.w);
     }
     sums
 }
 
-/// Returns the dot products of a code: `sum_j value_j * (basis . atom_j)`.
+/// Returns up to [`LANES`] values, filled up with zeros.
 #[inline(always)]
-fn sparse(
-    code: impl Iterator<Item = (usize, f32)>,
-    atoms: &[[f32; PADDED]],
-    per_channel: usize,
-    basis: &Basis,
-) -> [f32; CHANNELS] {
-    let basis = &basis[..per_channel];
-    let mut sums = [0.0_f32; PADDED];
-    for (atom, value) in code {
-        let atom = &atoms[atom * per_channel..(atom + 1) * per_channel];
-        let mut even = [0.0_f32; PADDED];
-        let mut odd = [0.0_f32; PADDED];
-        let mut pairs = atom.chunks_exact(2).zip(basis.chunks_exact(2));
-        for (atom, b) in &mut pairs {
-            for c in 0..PADDED {
-                even[c] += b[0] * atom[0][c];
-                odd[c] += b[1] * atom[1][c];
-            }
-        }
-        if per_channel % 2 == 1 {
-            for c in 0..PADDED {
-                even[c] += basis[per_channel - 1] * atom[per_channel - 1][c];
-            }
-        }
-        for c in 0..PADDED {
-            sums[c] += value * (even[c] + odd[c]);
-        }
-    }
-    [sums[0], sums[1], sums[2]]
+fn filled(values: &[f32]) -> Vec4 {
+    let at = |k: usize| values.get(k).copied().unwrap_or(0.0);
+    Vec4::new(at(0), at(1), at(2), at(3))
 }
 
-/// Returns the atoms with the channels of each coefficient side by side.
-fn interleave(dictionary: &Dictionary) -> Vec<[f32; PADDED]> {
-    let per_channel = dictionary.degree().rest_per_channel();
-    let mut atoms = Vec::with_capacity(dictionary.len() * per_channel);
-    for j in 0..dictionary.len() {
-        let atom = dictionary.atom(j);
-        atoms.extend((0..per_channel).map(|k| {
-            let mut coefficient = [0.0; PADDED];
-            for (c, value) in coefficient.iter_mut().take(CHANNELS).enumerate() {
-                *value = atom[c * per_channel + k];
+/// Returns the dot products of the three channels of a code's row with the basis. Products are added in the order of [`dense`], the
+/// channels side by side.
+#[inline(always)]
+fn sparse<const N: usize, const LEN: usize>(
+    code: Column<'_>,
+    atoms: &[[f32; LEN]],
+    basis: &Basis,
+) -> [f32; CHANNELS] {
+    // The sums of all coefficients are independent of each other.
+    let mut rest = [0.0_f32; LEN];
+    code.each(
+        #[inline(always)]
+        |atom, value| {
+            for (sum, coefficient) in rest.iter_mut().zip(&atoms[atom]) {
+                *sum += value * coefficient;
             }
-            coefficient
-        }));
+        },
+    );
+    let mut lanes = [Vec4::ZERO; LANES];
+    for (k, (channels, &basis)) in rest.as_chunks::<PADDED>().0.iter().zip(&basis[..N]).enumerate() {
+        lanes[k % LANES] += Vec4::from_array(*channels) * basis;
+    }
+    ((lanes[0] + lanes[1]) + (lanes[2] + lanes[3])).truncate().to_array()
+}
+
+/// Returns the atoms, each as its coefficients, of which each has the values of its channels and zeros up to [`PADDED`].
+fn padded(dictionary: &Dictionary) -> Vec<f32> {
+    let per_channel = dictionary.degree().rest_per_channel();
+    let mut atoms = vec![0.0; dictionary.len() * per_channel * PADDED];
+    if per_channel == 0 {
+        return atoms;
+    }
+    for (j, padded) in atoms.chunks_exact_mut(per_channel * PADDED).enumerate() {
+        for (c, channel) in dictionary.atom(j).chunks_exact(per_channel).enumerate() {
+            for (k, &coefficient) in channel.iter().enumerate() {
+                padded[k * PADDED + c] = coefficient;
+            }
+        }
     }
     atoms
 }

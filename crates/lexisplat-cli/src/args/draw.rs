@@ -80,7 +80,7 @@ pub(crate) struct View {
 /// timed. A GPU is timed by its own time stamps.
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// The scene, of any format. A .lexi is also drawn with dense SH.
+    /// The scene, of any format. A .lexi is also drawn with dense SH; on the CPU, a frame of each in turn.
     pub(crate) file: PathBuf,
     #[command(flatten)]
     pub(crate) views: Views,

@@ -56,7 +56,10 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     }
     if args.cpu_repeat > 0 {
         options.repeat = args.cpu_repeat;
-        results.push(bench_cpu(&scene, &cameras, &options, &bars)?);
+        let dense =
+            if let Scene::Sparse(model) = &scene { Some(Model::clone(model).into_splats()) } else { None };
+        let scenes: Vec<Scene<'_>> = [scene].into_iter().chain(dense.as_ref().map(Scene::from)).collect();
+        results.extend(bench_cpu(&scenes, &cameras, &options, &bars)?);
     }
     let gpu = gpu.as_ref().zip(speed);
     let report = Report { args, name: &input.name, scene, cameras: &cameras, gpu, results: &results };

@@ -7,7 +7,7 @@ use crate::parallel::*;
 use crate::radiance::Radiance;
 
 use super::clusters::Clusters;
-use super::lanes::LANES;
+use super::lanes::{LANES, Lanes};
 use super::math::whole;
 use super::project::{Body, Projection};
 use super::splat::{PixelRect, Splat};
@@ -82,6 +82,18 @@ impl Visible {
     }
 }
 
+/// Returns a number of a slot or Gaussian, of which there are fewer than 2^32.
+fn index(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}
+
+/// Returns the values of one lane.
+#[inline(always)]
+fn at<const N: usize>(values: &[Lanes; N], lane: usize) -> [f32; N] {
+    // By reference: the lanes of a group are many times as large.
+    values.each_ref().map(|lanes| lanes[lane])
+}
+
 /// The projections of consecutive Gaussians.
 struct Task<'a> {
     /// Index of the first Gaussian within its piece.
@@ -114,7 +126,7 @@ impl Task<'_> {
             }
             let placed = projection.place(&Body::load(geometry, group.clone()));
             for (lane, i) in group.enumerate() {
-                let [min, max] = placed.pixels.map(|corner| corner.map(|v| v[lane]));
+                let [min, max] = placed.pixels.each_ref().map(|corner| at(corner, lane));
                 if !(min[0] < max[0] && min[1] < max[1]) {
                     continue;
                 }
@@ -123,20 +135,15 @@ impl Task<'_> {
                     let Some(within) = chosen.within(pixels) else { continue };
                     pixels = within;
                 }
-                let colour = radiance.colour(i, placed.direction.map(|v| v[lane]));
-                if !colour.iter().all(|v| v.is_finite()) {
-                    continue;
-                }
                 rects[count] = pixels;
-                // Depths are positive, so the order of their bits is the order of their values. Indices of Gaussians fit
-                // in `u32`.
-                let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
+                // Depths are positive, so the order of their bits is the order of their values.
                 keys[count] = (placed.depth[lane].to_bits(), index(first_slot + count));
                 slots[count] = Splat {
-                    centre: placed.centre.map(|v| v[lane]),
-                    conic: placed.conic.map(|v| v[lane]),
+                    centre: at(&placed.centre, lane),
+                    conic: at(&placed.conic, lane),
                     opacity: placed.opacity[lane],
-                    colour,
+                    // Directions are replaced by colours below.
+                    colour: at(&placed.direction, lane),
                     cutoff: placed.cutoff[lane],
                     pixels,
                     variance_y: placed.variance_y[lane],
@@ -145,6 +152,31 @@ impl Task<'_> {
                 count += 1;
             }
         }
-        count
+        // Colours have a loop of their own, which stays small enough for the compiler to keep it in registers.
+        radiance.colours(
+            &mut slots[..count],
+            #[inline(always)]
+            |slot| (slot.gaussian as usize, slot.colour),
+            #[inline(always)]
+            |slot, colour| slot.colour = colour,
+        );
+        self.keep_finite(count)
+    }
+
+    /// Leaves out those of the first `count` slots whose colours are not finite. Returns the number of slots that stay.
+    fn keep_finite(&mut self, count: usize) -> usize {
+        let Self { slot: first_slot, slots, rects, keys, .. } = self;
+        let is_finite = |slot: &Splat| slot.colour.iter().all(|v| v.is_finite());
+        let mut kept = 0;
+        for k in 0..count {
+            if is_finite(&slots[k]) {
+                if kept < k {
+                    (slots[kept], rects[kept]) = (slots[k], rects[k]);
+                    keys[kept] = (keys[k].0, index(*first_slot + kept));
+                }
+                kept += 1;
+            }
+        }
+        kept
     }
 }
