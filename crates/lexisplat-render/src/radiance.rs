@@ -147,19 +147,21 @@ impl<'a> Radiance<'a> {
             }
             Rest::Sparse { codes, atoms } => {
                 let atoms = atoms.as_chunks::<LEN>().0;
-                self.each(
-                    items,
-                    seen,
-                    set,
-                    #[inline(always)]
-                    |i, basis| match codes.row(i) {
-                        CodedRest::Code(column) => sparse::<N, LEN>(column, atoms, basis),
+                let mut reader = codes.rows();
+                for item in items {
+                    let (i, direction) = seen(item);
+                    let rest = match reader.row(i) {
+                        CodedRest::Code(column) if column.is_empty() => [0.0; CHANNELS],
+                        CodedRest::Code(column) => {
+                            sparse::<N, LEN>(column, atoms, &rest_basis(self.shown, direction))
+                        }
                         CodedRest::Exact(row) => match row.as_chunks::<N>().0.as_chunks::<CHANNELS>().0 {
-                            [row, ..] => dense(row, basis),
+                            [row, ..] => dense(row, &rest_basis(self.shown, direction)),
                             [] => [0.0; CHANNELS],
                         },
-                    },
-                );
+                    };
+                    set(item, self.finished(i, rest));
+                }
             }
         }
     }
@@ -177,12 +179,17 @@ impl<'a> Radiance<'a> {
         for item in items {
             let (i, direction) = seen(item);
             let rest = rest(i, &rest_basis(self.shown, direction));
-            let colour = std::array::from_fn(|c| {
-                let sum = COLOUR_OFFSET + C0 * self.dc[i][c] + rest[c];
-                if sum.is_finite() { sum.max(0.0) } else { f32::NAN }
-            });
-            set(item, colour);
+            set(item, self.finished(i, rest));
         }
+    }
+
+    /// Returns the colour of Gaussian `i`. `rest` is the sum over all bands but the first.
+    #[inline(always)]
+    fn finished(&self, i: usize, rest: [f32; CHANNELS]) -> [f32; CHANNELS] {
+        std::array::from_fn(|c| {
+            let sum = COLOUR_OFFSET + C0 * self.dc[i][c] + rest[c];
+            if sum.is_finite() { sum.max(0.0) } else { f32::NAN }
+        })
     }
 }
 

@@ -258,14 +258,46 @@ impl<'a> Column<'a> {
     }
 }
 
-/// Returns the sum of the first `number` counts. All are looked at, so that the loop has no branches and a known length.
-#[inline(always)]
-fn first_of(counts: &[u8; GAUSSIANS_PER_CHECKPOINT], number: usize) -> usize {
-    let number = u8::try_from(number).unwrap_or(u8::MAX);
-    // A count is at most 72, the length of an atom of degree 4, so that 16 bits hold the sum.
-    let sum: u16 =
-        (0_u8..).zip(counts).map(|(k, &count)| if k < number { u16::from(count) } else { 0 }).sum();
-    usize::from(sum)
+/// Reads rows of Gaussians that are near each other. It remembers where the columns of [`GAUSSIANS_PER_CHECKPOINT`] Gaussians start.
+#[derive(Debug, Clone)]
+pub struct Rows<'a> {
+    codes: &'a SparseCodes,
+    /// The block of which `starts` is.
+    block: usize,
+    /// Number of nonzeros of the block before each of its Gaussians. It is below 64 * 72, 72 being the longest atom.
+    starts: [u16; GAUSSIANS_PER_CHECKPOINT],
+}
+
+impl<'a> Rows<'a> {
+    /// Returns the stored form of Gaussian `i`, as [`SparseCodes::row`] does.
+    ///
+    /// # Panics
+    /// If `i` is not below the number of Gaussians.
+    #[inline(always)]
+    pub fn row(&mut self, i: usize) -> CodedRest<'a> {
+        let codes = self.codes;
+        let len = usize::from(codes.counts[i]);
+        if len == 0
+            && !codes.escapes.gaussians.is_empty()
+            && let Some(row) = codes.escape(i)
+        {
+            return CodedRest::Exact(row);
+        }
+        let (block, within) = (i / GAUSSIANS_PER_CHECKPOINT, i % GAUSSIANS_PER_CHECKPOINT);
+        if block != self.block {
+            self.block = block;
+            let mut sum = 0;
+            for (start, &count) in self.starts.iter_mut().zip(&codes.counts[i - within..]) {
+                *start = sum;
+                sum += u16::from(count);
+            }
+        }
+        CodedRest::Code(Column {
+            codes,
+            start: codes.checkpoint(block) + usize::from(self.starts[within]),
+            len,
+        })
+    }
 }
 
 /// Returns a finite half as a single, which has the same value. `f16::to_f32` looks up the processor's instructions at each call.
@@ -433,20 +465,37 @@ impl SparseCodes {
     #[inline(always)]
     pub fn row(&self, i: usize) -> CodedRest<'_> {
         let len = usize::from(self.counts[i]);
-        if len == 0 && !self.escapes.gaussians.is_empty() {
-            // The conversion keeps the number, since a scene has fewer than 2^32 Gaussians.
-            if let Ok(k) = self.escapes.gaussians.binary_search_by(|&g| (g as usize).cmp(&i)) {
-                return CodedRest::Exact(&self.escapes.rows[k * self.dim..(k + 1) * self.dim]);
-            }
+        if len == 0
+            && let Some(row) = self.escape(i)
+        {
+            return CodedRest::Exact(row);
         }
-        let (block, within) = (i / GAUSSIANS_PER_CHECKPOINT, i % GAUSSIANS_PER_CHECKPOINT);
-        let before = match self.counts.as_chunks::<GAUSSIANS_PER_CHECKPOINT>().0.get(block) {
-            Some(counts) => first_of(counts, within),
-            None => self.counts[i - within..i].iter().map(|&c| usize::from(c)).sum(),
-        };
+        let start = self.checkpoint(i / GAUSSIANS_PER_CHECKPOINT);
+        let own = i - i % GAUSSIANS_PER_CHECKPOINT..i;
+        let before: usize = self.counts[own].iter().map(|&c| usize::from(c)).sum();
+        CodedRest::Code(Column { codes: self, start: start + before, len })
+    }
+
+    /// Returns the exact coefficients of Gaussian `i`, if they are stored.
+    #[inline]
+    fn escape(&self, i: usize) -> Option<&[f32]> {
+        // The conversion keeps the number, since a scene has fewer than 2^32 Gaussians.
+        let k = self.escapes.gaussians.binary_search_by(|&g| (g as usize).cmp(&i)).ok()?;
+        Some(&self.escapes.rows[k * self.dim..(k + 1) * self.dim])
+    }
+
+    /// Returns the number of nonzeros before a block of [`GAUSSIANS_PER_CHECKPOINT`] Gaussians.
+    #[inline(always)]
+    fn checkpoint(&self, block: usize) -> usize {
         #[expect(clippy::cast_possible_truncation, reason = "bounded by a Vec's length")]
-        let start = self.checkpoints[block] as usize + before;
-        CodedRest::Code(Column { codes: self, start, len })
+        let start = self.checkpoints[block] as usize;
+        start
+    }
+
+    /// Returns a reader of rows of Gaussians that are near each other.
+    #[must_use]
+    pub fn rows(&self) -> Rows<'_> {
+        Rows { codes: self, block: usize::MAX, starts: [0; GAUSSIANS_PER_CHECKPOINT] }
     }
 
     /// Writes the SH-rest of Gaussian `i` into `out`. The values are exactly those of the decompressed scene.
@@ -473,11 +522,34 @@ pub fn reconstruct(dictionary: &Dictionary, code: impl Iterator<Item = (usize, f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ShDegree;
 
     #[test]
     fn every_finite_half_is_widened_to_its_value() {
         for half in (0..=u16::MAX).map(f16::from_bits).filter(|half| half.is_finite()) {
             assert_eq!(widened(half).to_bits(), half.to_f32().to_bits(), "{half}");
+        }
+    }
+
+    #[test]
+    fn a_reader_finds_the_rows_of_any_order() {
+        // The unit vectors of degree 1.
+        let atoms: Vec<f32> = (0..81).map(|k| f32::from(u8::from(k % 10 == 0))).collect();
+        let dictionary = Dictionary::new(ShDegree::ONE, atoms).unwrap();
+        let n = 5 * GAUSSIANS_PER_CHECKPOINT + 7;
+        let counts: Vec<u8> = (0..n).map(|i| if i % 11 == 0 { 0 } else { [0, 2, 4, 1, 3][i % 5] }).collect();
+        let indices: Vec<u8> = counts.iter().flat_map(|&count| 0..count).collect();
+        let values = (0..indices.len()).map(|k| k as f32).collect();
+        let escapes = Escapes { gaussians: vec![0, 66, 132], rows: (0..27_u8).map(f32::from).collect() };
+        let codes = SparseCodes::new(&dictionary, counts, Indices::U8(indices), Values::F32(values), escapes)
+            .unwrap();
+        let told = |row: CodedRest<'_>| match row {
+            CodedRest::Exact(row) => (true, row.to_vec()),
+            CodedRest::Code(column) => (false, column.iter().map(|(_, value)| value).collect()),
+        };
+        let mut rows = codes.rows();
+        for i in (0..n).chain((0..n).rev().step_by(3)).chain((0..n).map(|k| k * 101 % n)) {
+            assert_eq!(told(rows.row(i)), told(codes.row(i)), "{i}");
         }
     }
 }
