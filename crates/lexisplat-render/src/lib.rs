@@ -87,7 +87,8 @@ pub use colmap::{MAX_COLMAP_BYTES, read_colmap_binary, read_colmap_text};
 #[cfg(feature = "gpu")]
 pub use cpu::CpuScene;
 pub use cpu::{
-    Drawn, GaussianChange, PictureAdjoint, PictureErrors, RenderOptions, render, render_measured, sensitivity,
+    Differentiator, Drawn, GaussianChange, GaussianGradient, PictureAdjoint, PictureErrors, PictureGradient,
+    RenderOptions, render, render_measured, sensitivity,
 };
 pub use error::{Error, Result};
 pub use image::Image;
