@@ -237,17 +237,18 @@ mod tests {
             let k = i as f32;
             g.positions[i] = [0.3 * (1.7 * k).sin(), 0.3 * (2.9 * k).cos(), 0.3 * (0.9 * k).sin()];
             g.scales[i] = [-1.6, -2.1 + 0.3 * k.sin(), -2.9 + 0.2 * k.cos()];
-            g.opacities[i] = -0.5 + 0.8 * (1.3 * k).sin();
+            g.opacities[i] = 1.0 + 0.6 * (1.3 * k).sin();
             g.dc[i] = g.dc[i].map(|v| 0.3 * v.tanh());
         }
         for v in &mut splats.sh_rest {
             *v = 0.1 * v.tanh();
         }
-        let cameras = orbit(&splats.geometry, 2, 70, 50);
+        let cameras = orbit(&splats.geometry, 2, 140, 100);
         let picture = |camera| render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
         let targets = cameras.iter().map(picture).map(|mut image: Image| {
             for (k, pixel) in image.pixels.iter_mut().enumerate() {
-                *pixel = pixel.map(|v| v * (0.6 + 0.3 * (k as f32 * 0.1).sin()));
+                let (x, y) = ((k % 140) as f32 / 140.0, (k / 140) as f32 / 100.0);
+                *pixel = pixel.map(|v| v * (0.1 + 0.4 * x + 0.4 * y));
             }
             image
         });
@@ -276,7 +277,7 @@ mod tests {
                 for k in 0..VALUES {
                     // Splats begin to show where their opacity rises above 1/255, which the gradient does not know; `to_world`
                     // is tested by itself.
-                    let (step, most) = if k < 10 { (1.0 / 512.0, 0.2) } else { (1.0 / 64.0, 0.01) };
+                    let (step, most) = if k < 10 { (1.0 / 128.0, 0.25) } else { (1.0 / 64.0, 0.01) };
                     let (mut squares, mut off) = (0.0_f64, 0.0_f64);
                     for (row, i) in found.rows.iter().zip(0..splats.len()) {
                         let [more, less] = [step, -step].map(|step| {
