@@ -58,7 +58,7 @@ def main():
             for setting, options in SETTINGS:
                 small = folder / "small.lexi"
                 known = ["--cameras", cameras] if cameras and "--psnr" in options else []
-                lexisplat("compress", model, "-o", small, *options, *known, "--quiet")
+                lexisplat("compress", model, "-o", small, *options, *known, "--overwrite", "--quiet")
                 views = ["--cameras", cameras, "--split", "test"] if cameras else AROUND
                 found, codes, dense = rows(small, views, args)
                 stages = [times["stages"]["project"]["median"] for times in (codes, dense)]

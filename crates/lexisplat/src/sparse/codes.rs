@@ -258,7 +258,7 @@ impl<'a> Column<'a> {
     }
 }
 
-/// Reads rows of Gaussians that are near each other. It remembers where the columns of [`GAUSSIANS_PER_CHECKPOINT`] Gaussians start.
+/// Reads rows of Gaussians that are near each other. It remembers where the columns of 64 Gaussians start.
 #[derive(Debug, Clone)]
 pub struct Rows<'a> {
     codes: &'a SparseCodes,
