@@ -51,6 +51,7 @@ mod packing_views;
 mod part_step;
 mod parts;
 mod photo_views;
+mod refine;
 mod refit;
 mod report;
 mod run;

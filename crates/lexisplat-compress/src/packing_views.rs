@@ -46,6 +46,8 @@ const FITTED_PIXELS: Pixels = Pixels { always: 12_000_000, each: 6, most: 24_000
 /// Divisor of [`FITTED_PIXELS`] for a part of a scene. With half this divisor three copies of room-large have 0.14 dB more,
 /// in 1.2 times the time.
 const PART_FITTED_SHARE: u64 = 4;
+/// Number of pixels to which everything is fitted.
+const REFINED_PIXELS: u64 = 24_000_000;
 /// Every `MEASURED_HALVED`-th view that measures is also drawn at half its size. Every `FITTED_HALVED`-th view for fitting
 /// is at half its size instead. Otherwise errors that are even over many pixels count for too little, and show when
 /// pictures are drawn smaller (docs/METHOD.md, "How sharp").
@@ -311,6 +313,19 @@ impl PackingViews {
     /// Returns views to which a part of a scene is fitted, like [`Self::fitting`]. They draw fewer pixels.
     pub(crate) fn fitting_part(&self, part: &Splats) -> Vec<Camera> {
         self.fitting_to(part, FITTED_PIXELS.of(part) / PART_FITTED_SHARE)
+    }
+
+    /// Returns the views to which everything is fitted: those that measure and do not judge, and some beside them and all around.
+    pub(crate) fn refining(&self, splats: &Splats) -> Vec<Camera> {
+        let hold = std::env::var("HOLD").ok().and_then(|v| v.parse::<usize>().ok()).unwrap_or(1000);
+        let judges: Vec<&Camera> = self.judging.iter().skip(hold / 2).step_by(hold).collect();
+        let mut views: Vec<Camera> =
+            self.measuring.iter().filter(|camera| !judges.contains(camera)).cloned().collect();
+        if self.given && std::env::var("ASIDE").is_ok() {
+            views.extend(aside(&splats.geometry, &self.measuring, ASIDE));
+            views.extend(surround(&splats.geometry, FITTED_AROUND, GENERATED_SIZE, GENERATED_DISTANCES));
+        }
+        sampled(views, REFINED_PIXELS)
     }
 
     fn fitting_to(&self, splats: &Splats, pixels: u64) -> Vec<Camera> {

@@ -39,6 +39,7 @@ pub(crate) struct Refitting<S> {
 }
 
 /// The views and pictures to which base colours and opacities are fitted.
+#[derive(Clone)]
 pub(crate) struct Fit {
     cameras: Vec<Camera>,
     /// The original's pictures.

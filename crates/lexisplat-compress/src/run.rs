@@ -187,6 +187,33 @@ impl Packing {
             }
             _ => (None, sensitivity),
         };
+        let trial = |name: &str| std::env::var(name).ok().and_then(|v| v.parse::<f64>().ok());
+        let (fewer, sensitivity) = match (trial("REFINE"), &fit) {
+            (Some(steps), Some(fit)) => {
+                let begin = trial("BEGIN").unwrap_or(36.0);
+                let start = fewer.as_ref().unwrap_or(&splats);
+                let packer = Packer::new(start, &sensitivity, &self.options)?;
+                let refitting = Refitting::new(packer, Some(fit.clone()));
+                let judges = views.some_judging(PRESET_JUDGES);
+                let mut judge = Judge::new(self.renderer()?, &splats, &judges, given, progress)?;
+                let (packed, _, score) = pack_to_target(
+                    &refitting,
+                    &mut judge,
+                    crate::Target::MeanPsnr(begin),
+                    u64::MAX,
+                    progress,
+                )?;
+                let mut made = packed.unpack()?.into_splats();
+                made.meta = splats.meta.clone();
+                eprintln!("begin {} Gaussians, {:.2}", made.len(), score.judged);
+                let refining = crate::refine::Refining::to(&splats, views.refining(&splats), progress)?;
+                refining.refine(&mut made, steps as usize, progress)?;
+                eprintln!("refined {:.2}", judge.score(&made, progress)?.judged);
+                let sensitivity = views.sensitivity(&mut renderer, &made, progress)?;
+                (Some(made), sensitivity)
+            }
+            _ => (fewer, sensitivity),
+        };
         let packed_scene = fewer.as_ref().unwrap_or(&splats);
         let options = match self.options.points_of_view.is_empty() {
             true => self.options.clone().with_points_of_view(views.points_of_view(POINTS_OF_VIEW)),
