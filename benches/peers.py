@@ -3,6 +3,7 @@
 
     python3 benches/peers.py FOLDER [--only NAME ...] [--asked 36 40 44] [--node NODE] [--npm NODE_MODULES]
         [--spz SPZ_READER] [--lgsc BINARY] [--sog NAME ...] [--limit SECONDS] [--binary LEXISPLAT] [--json FILE]
+        [--times NAME ...] [--tables FILE ...] [--peers-only]
 
 Every binary float PLY of FOLDER that has a `NAME.cameras.json` (NAME may be a prefix of the PLY's name) is encoded by
 every codec at every setting and decoded to a PLY by the codec's own program. `lexisplat compare` scores every such PLY
@@ -19,7 +20,8 @@ SOG is made of the models that --sog names, and is given up after --limit CPU se
 
 Bytes at a quality are on straight lines in log(bytes) between the points of a codec that no other point of it beats. Where
 a codec's curve begins above the quality, its smallest file counts. Seconds are CPU seconds (user and system) and wall
-seconds of the whole program, memory is the peak of its resident set. FILE keeps what was measured, and a second run measures what is missing in it.
+seconds of the whole program, and memory is the peak of its resident set. FILE keeps what was measured, and a second run
+measures what is missing in it.
 """
 
 import argparse
@@ -39,10 +41,13 @@ from rate_distortion import cost, header  # noqa: E402
 from real_models import ROOT  # noqa: E402
 
 READER = ROOT / "benches/peer_reader.mjs"
+SPZ_VERSION = 4  # the newest
 # Bits of SH of degree 1 and above it; 5 and 4 are the library's own.
 SPZ_BITS = ((3, 2), (4, 3), (5, 4), (6, 5), (7, 6), (8, 8))
-SHARES = (90, 75, 50, 25)  # percent of the Gaussians that splat-transform leaves
+SHARES = (95, 90, 75, 50, 25)  # percent of the Gaussians that splat-transform leaves
+SOG_SHARES = (95, 90, 75)  # the same before SOG, which takes minutes
 STEP = 2.0  # dB that one file more at an end is beyond the quality that was missed
+MIDDLE = 40.0  # dB; seconds and memory are shown of the setting of a codec that comes nearest to it
 MIB = 1024.0  # KiB, the unit of ru_maxrss on Linux
 WITH, WITHOUT = "lexisplat, cameras", "lexisplat"
 
@@ -73,38 +78,43 @@ def together(*parts):
 
 
 def peers(args, model):
-    """(codec, setting, encode, decode, limit): the functions are of paths and give commands, which run in turn."""
+    """(codec, setting, encode, decode, ending of its files, limit): the two functions make commands, which run in turn, of
+    the paths that are read and written."""
     if args.npm:
         transform = [args.node, args.npm / "@playcanvas/splat-transform/bin/cli.mjs", "-q", "-w", "-g", "cpu"]
+        adobe = [args.node, READER, args.npm]
         convert = lambda a, b: [[*transform, a, b]]
+
+        def fewer(way, share):
+            # Its command line decimates into a PLY alone.
+            between = lambda b: b.with_suffix(".fewer.ply")
+            return lambda a, b: [[*transform, a, f"--{way}", f"{share}%", between(b)], [*transform, between(b), b]]
+
         for version in (4, 3):
-            yield "SPZ, splat-transform", f"v{version}", lambda a, b, v=version: [[*transform, "--spz-version", v, a, b]], convert, None, "spz"
+            spz = lambda a, b, v=version: [[*transform, "--spz-version", v, a, b]]
+            yield "SPZ, splat-transform", f"v{version}", spz, convert, "spz", None
         for way in ("decimate", "decimate-adaptive"):
             for share in SHARES:
-                fewer = lambda a, b, way=way, share=share: [
-                    [*transform, a, f"--{way}", f"{share}%", b.with_suffix(".fewer.ply")],
-                    [*transform, b.with_suffix(".fewer.ply"), b]]
-                yield "decimate and SPZ", f"{way} {share}%", fewer, convert, None, "spz"
-        adobe = [args.node, READER, args.npm]
-        for first, rest in SPZ_BITS:
-            yield ("SPZ, @adobe/spz", f"SH {first}, {rest}", lambda a, b, f=first, r=rest: [[*adobe, "spz", a, b, f, r]],
-                   lambda a, b: [[*adobe, "read", "@adobe/spz", a, b]], None, "spz")
+                yield "decimate and SPZ", f"{way} {share}%", fewer(way, share), convert, "spz", None
+        for bits in SPZ_BITS:
+            spz = lambda a, b, bits=bits: [[*adobe, "spz", a, b, *bits]]
+            read = lambda a, b: [[*adobe, "read", "@adobe/spz", a, b]]
+            yield "SPZ, @adobe/spz", "SH %d, %d" % bits, spz, read, "spz", None
+        if model.stem in args.sog:
+            yield "SOG, splat-transform", "default", convert, convert, "sog", args.limit
+            for share in SOG_SHARES:
+                yield "decimate and SOG", f"decimate {share}%", fewer("decimate", share), convert, "sog", args.limit
     if args.spz:
-        for first, rest in SPZ_BITS:
-            yield ("SPZ, nianticlabs", f"SH {first}, {rest}", lambda a, b, f=first, r=rest: [[args.spz, "write", a, b, 4, f, r]],
-                   lambda a, b: [[args.spz, "read", a, b]], None, "spz")
+        for bits in SPZ_BITS:
+            spz = lambda a, b, bits=bits: [[args.spz, "write", a, b, SPZ_VERSION, *bits]]
+            yield "SPZ, nianticlabs", "SH %d, %d" % bits, spz, lambda a, b: [[args.spz, "read", a, b]], "spz", None
     if args.lgsc:
         for level in (2, 1, 0):
+            encode = [args.lgsc, "--mode", 0, "--compLevel", level]
+            decode = [args.lgsc, "--mode", 1, "--outputBinaryPly", 1]
             yield ("L-GSC", f"level {level}",
-                   lambda a, b, n=level: [[args.lgsc, "--mode", 0, "--uncompressedDataPath", a, "--compressedStreamPath", b, "--compLevel", n]],
-                   lambda a, b: [[args.lgsc, "--mode", 1, "--compressedStreamPath", a, "--reconstructedDataPath", b, "--outputBinaryPly", 1]], None, "lgsc")
-    if args.npm and model.stem in (args.sog or []):
-        yield "SOG, splat-transform", "default", convert, convert, args.limit, "sog"
-        for share in SHARES[1:]:
-            fewer = lambda a, b, share=share: [
-                [*transform, a, "--decimate", f"{share}%", b.with_suffix(".fewer.ply")],
-                [*transform, b.with_suffix(".fewer.ply"), b]]
-            yield "decimate and SOG", f"decimate {share}%", fewer, convert, args.limit, "sog"
+                   lambda a, b, e=encode: [[*e, "--uncompressedDataPath", a, "--compressedStreamPath", b]],
+                   lambda a, b, d=decode: [[*d, "--compressedStreamPath", a, "--reconstructedDataPath", b]], "lgsc", None)
 
 
 class Bench:
@@ -112,7 +122,7 @@ class Bench:
         self.args = args
         self.rows = json.loads(args.json.read_text()) if args.json and args.json.exists() else []
 
-    def point(self, model, count, codec, setting, encode, decode, limit, kind):
+    def point(self, model, count, codec, setting, encode, decode, kind, limit):
         """Encodes, decodes and scores, unless that was done; gives the row, or None where the codec failed."""
         found = next((r for r in self.rows if (r["scene"], r["codec"], r["setting"]) == (model.stem, codec, setting)), None)
         if found:
@@ -144,7 +154,7 @@ class Bench:
         def ask(decibels):
             compress = lambda a, b: [[self.args.binary, "compress", "--quiet", a, "-o", b, *options, "--psnr", f"{decibels:g}"]]
             decompress = lambda a, b: [[self.args.binary, "decompress", "--quiet", a, "-o", b]]
-            return self.point(model, count, name, f"--psnr {decibels:g}", compress, decompress, None, "lexi")
+            return self.point(model, count, name, f"--psnr {decibels:g}", compress, decompress, "lexi", None)
 
         asked = sorted(self.args.asked)
         reached = [row["psnr"] for row in map(ask, asked) if row]
@@ -156,12 +166,14 @@ class Bench:
     def measure(self, model, count):
         for peer in peers(self.args, model):
             self.point(model, count, *peer)
+        if self.args.peers_only:
+            return
         with tempfile.TemporaryDirectory() as folder:
             self.ours(model, count, WITH, ["--cameras", training(cameras_of(model), folder)])
         self.ours(model, count, WITHOUT, ["--no-cameras"])
 
 
-def tables(rows, asked):
+def tables(rows, asked, times):
     good = [r for r in rows if "failed" not in r]
     codecs = [c for c in dict.fromkeys(r["codec"] for r in good) if c not in (WITH, WITHOUT)]
     kilobytes = lambda size: "-" if size is None else f"{size / 1000:,.0f}"
@@ -188,10 +200,12 @@ def tables(rows, asked):
             each = lambda r: f"{r['setting']}: " + (r.get("failed") or f"{r['bytes'] / r['gaussians']:.2f} @ {r['psnr']:.2f} ({r['worst']:.1f})")
             print(f"| {scene} | {codec} | {'; '.join(map(each, of))} |")
 
-    print("\n| scene | codec | setting | encode: CPU s | wall s | MiB | decode: CPU s | wall s | MiB |\n|---|---|---|---|---|---|---|---|---|")
-    for r in good:
-        cost_of = lambda used: f"{used['cpu']:.1f} | {used['wall']:.1f} | {used['mib']:.0f}"
-        print(f"| {r['scene']} | {r['codec']} | {r['setting']} | {cost_of(r['encode'])} | {cost_of(r['decode'])} |")
+    print("\n| scene | codec | setting | dB | encode: CPU s | wall s | MiB | decode: CPU s | wall s | MiB |\n|---|---|---|---|---|---|---|---|---|---|")
+    for scene in times:
+        for codec in dict.fromkeys(r["codec"] for r in good if r["scene"] == scene):
+            nearest = min((r for r in good if (r["scene"], r["codec"]) == (scene, codec)), key=lambda r: abs(r["psnr"] - MIDDLE))
+            taken = [f"{nearest[way][key]:.{digits}f}" for way in ("encode", "decode") for key, digits in (("cpu", 2), ("wall", 1), ("mib", 0))]
+            print(f"| {scene} | {codec} | {nearest['setting']} | {nearest['psnr']:.1f} | {' | '.join(taken)} |")
 
 
 def main():
@@ -203,19 +217,24 @@ def main():
     parser.add_argument("--npm", type=Path)
     parser.add_argument("--spz", type=Path)
     parser.add_argument("--lgsc", type=Path)
-    parser.add_argument("--sog", nargs="+", metavar="NAME")
+    parser.add_argument("--sog", nargs="+", metavar="NAME", default=[])
     parser.add_argument("--limit", type=int, default=480)
     parser.add_argument("--binary", type=Path, default=ROOT / "target/release/lexisplat")
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--tables", action="store_true", help="print the tables of --json alone")
+    parser.add_argument("--peers-only", action="store_true", help="leave out ours")
+    parser.add_argument("--times", nargs="+", default=["bonsai-3dgs", "room-large"], metavar="NAME", help="models of the table of seconds")
+    parser.add_argument("--tables", nargs="+", type=Path, metavar="FILE", help="measure nothing, and print the tables of such files of --json")
     args = parser.parse_args()
+    if args.tables:
+        rows = {(r["scene"], r["codec"], r["setting"]): r for file in args.tables for r in json.loads(file.read_text())}
+        tables(list(rows.values()), args.asked, args.times)
+        return
     bench = Bench(args)
-    if not args.tables:
-        for model in sorted(args.folder.glob("*.ply")):
-            found = header(model)
-            if found and cameras_of(model) and (not args.only or model.stem in args.only):
-                bench.measure(model, found[1])
-    tables(bench.rows, args.asked)
+    for model in sorted(args.folder.glob("*.ply")):
+        found = header(model)
+        if found and cameras_of(model) and (not args.only or model.stem in args.only):
+            bench.measure(model, found[1])
+    tables(bench.rows, args.asked, args.times)
 
 
 if __name__ == "__main__":
