@@ -45,7 +45,7 @@ SPZ_VERSION = 4  # the newest
 # Bits of SH of degree 1 and above it; 5 and 4 are the library's own.
 SPZ_BITS = ((3, 2), (4, 3), (5, 4), (6, 5), (7, 6), (8, 8))
 SHARES = (95, 90, 75, 50, 25)  # percent of the Gaussians that splat-transform leaves
-SOG_SHARES = (95, 90, 75)  # the same before SOG, which takes minutes
+SOG_SHARES = (95, 90)  # the same before SOG, which takes minutes
 STEP = 2.0  # dB that one file more at an end is beyond the quality that was missed
 MIDDLE = 40.0  # dB; seconds and memory are shown of the setting of a codec that comes nearest to it
 MIB = 1024.0  # KiB, the unit of ru_maxrss on Linux
