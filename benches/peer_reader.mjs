@@ -1,9 +1,11 @@
-// The readers of npm's packages, for formats_beside_peers.py. PACKAGES is a folder `node_modules`.
+// The readers of npm's packages, for formats_beside_peers.py and peers.py. PACKAGES is a folder `node_modules`.
 //
 //   node peer_reader.mjs PACKAGES versions
-//   node peer_reader.mjs PACKAGES read PEER FILE OUT.ply    PEER is three or gaussian-splats-3d
+//   node peer_reader.mjs PACKAGES read PEER FILE OUT.ply    PEER is three, gaussian-splats-3d or @adobe/spz
 //   node peer_reader.mjs PACKAGES time PEER FILE ROUNDS     or splat-transform; seconds of the fastest round, and Gaussians
 //   node peer_reader.mjs PACKAGES ksplat FILE.ply OUT.ksplat LEVEL DEGREE
+//   node peer_reader.mjs PACKAGES spz FILE.ply OUT.spz SH1 REST    by @adobe/spz, with so many bits for SH of degree 1
+//                                                          and above it
 //
 // three keeps covariances instead of scales and rotations, and colours of 8 bits: its OUT.ply has the properties cov_0 to
 // cov_5, red, green, blue and alpha. All that is written is what the reader gave, in its own axes.
@@ -25,6 +27,53 @@ async function gaussianSplats3d() {
 }
 // SH coefficients of one channel above degree 0, by degree.
 const REST = [0, 3, 8, 15];
+
+// The columns of a binary little-endian PLY of floats, by name.
+function readPly(file) {
+    const bytes = fs.readFileSync(file);
+    const end = bytes.indexOf("end_header\n") + "end_header\n".length;
+    const lines = bytes.toString("latin1", 0, end).split("\n").map((line) => line.trim().split(" "));
+    const count = Number(lines.find((words) => words[0] === "element")[2]);
+    const names = lines.filter((words) => words[0] === "property").map((words) => words[2]);
+    const rows = new Float32Array(bytes.buffer.slice(bytes.byteOffset + end, bytes.byteOffset + end + 4 * count * names.length));
+    const columns = (...wanted) => {
+        const at = wanted.map((name) => names.indexOf(name)), out = new Float32Array(count * at.length);
+        for (let i = 0; i < count; i++) for (let k = 0; k < at.length; k++) out[i * at.length + k] = rows[i * names.length + at[k]];
+        return out;
+    };
+    return { count, names, columns };
+}
+
+const adobe = async () => (await load("@adobe/spz/dist/spz.js")).default();
+
+async function writeSpz(file, out, sh1Bits, shRestBits) {
+    const spz = await adobe();
+    const { count, names, columns } = readPly(file);
+    const per = names.filter((name) => name.startsWith("f_rest_")).length / 3;
+    const coefficients = Array.from({ length: 3 * per }, (_, k) => `f_rest_${(k % 3) * per + Math.floor(k / 3)}`);
+    const cloud = {
+        numPoints: count, shDegree: REST.indexOf(per), antialiased: false, extensions: [],
+        positions: columns("x", "y", "z"), scales: columns("scale_0", "scale_1", "scale_2"),
+        rotations: columns("rot_1", "rot_2", "rot_3", "rot_0"), alphas: columns("opacity"),
+        colors: columns("f_dc_0", "f_dc_1", "f_dc_2"), sh: columns(...coefficients),
+    };
+    const version = spz.LATEST_SPZ_HEADER_VERSION;
+    fs.writeFileSync(out, spz.saveSpzToBuffer(cloud, { version, from: spz.CoordinateSystem.RDF, sh1Bits, shRestBits }));
+}
+
+function dumpCloud(cloud, out) {
+    const per = REST[cloud.shDegree];
+    const names = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", ...restNames(per), "opacity", "scale_0", "scale_1", "scale_2"];
+    writePly(out, [...names, "rot_0", "rot_1", "rot_2", "rot_3"], cloud.numPoints, (i, row) => {
+        row.set(cloud.positions.subarray(3 * i, 3 * i + 3));
+        row.set(cloud.colors.subarray(3 * i, 3 * i + 3), 3);
+        for (let k = 0; k < per; k++) for (let c = 0; c < 3; c++) row[6 + c * per + k] = cloud.sh[3 * (i * per + k) + c];
+        row[6 + 3 * per] = cloud.alphas[i];
+        row.set(cloud.scales.subarray(3 * i, 3 * i + 3), 7 + 3 * per);
+        const [x, y, z, w] = cloud.rotations.subarray(4 * i, 4 * i + 4);
+        row.set([w, x, y, z], 10 + 3 * per);
+    });
+}
 
 function writePly(file, names, count, fill) {
     const lines = names.map((name) => `property float ${name}\n`).join("");
@@ -48,6 +97,13 @@ async function reader(peer, file) {
         return async () => {
             const [table] = await readFile({ filename: file, inputFormat, options: {}, params: [], fileSystem });
             return { count: table.numRows };
+        };
+    }
+    if (peer === "@adobe/spz") {
+        const spz = await adobe();
+        return async () => {
+            const cloud = spz.loadSpzFromBuffer(new Uint8Array(buffer), { to: spz.CoordinateSystem.RDF });
+            return { count: cloud.numPoints, cloud };
         };
     }
     if (peer === "three" && kind === ".glb") {
@@ -163,15 +219,18 @@ if (task === "versions") {
     console.log(`${best.toFixed(4)} ${count}`);
 } else if (task === "read") {
     const [peer, file, out] = words;
-    const { geometry, splats } = await (await reader(peer, file))();
-    await (geometry ? dumpThree(geometry, out) : dumpSplats(splats, out));
+    const { geometry, splats, cloud } = await (await reader(peer, file))();
+    await (cloud ? dumpCloud(cloud, out) : geometry ? dumpThree(geometry, out) : dumpSplats(splats, out));
 } else if (task === "ksplat") {
     const [file, out, level, degree] = words;
     const { PlyParser, SplatBufferGenerator } = await gaussianSplats3d();
     const splats = PlyParser.parseToUncompressedSplatArray(bufferOf(file), Number(degree));
     const made = SplatBufferGenerator.getStandardGenerator(1, Number(level)).generateFromUncompressedSplatArray(splats);
     fs.writeFileSync(out, Buffer.from(made.bufferData));
+} else if (task === "spz") {
+    const [file, out, first, rest] = words;
+    await writeSpz(file, out, Number(first), Number(rest));
 } else {
-    console.error("versions | read PEER FILE OUT.ply | time PEER FILE ROUNDS | ksplat FILE.ply OUT.ksplat LEVEL DEGREE");
+    console.error("versions | read PEER FILE OUT.ply | time PEER FILE ROUNDS | ksplat FILE.ply OUT.ksplat LEVEL DEGREE | spz FILE.ply OUT.spz SH1 REST");
     process.exit(2);
 }

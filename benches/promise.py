@@ -2,16 +2,12 @@
 """The quality asked for beside the quality reached over views that were not there when a file was made.
 
     python3 benches/promise.py FOLDER [FOLDER ...] [--only NAME ...] [--asked 36 40 44] [--presets] [--guess]
-        [--binary LEXISPLAT] [--json FILE] [--peer "NAME=COMMAND {model} {encoded} {decoded}" ...]
+        [--binary LEXISPLAT] [--json FILE]
 
 Every binary float PLY of the folders that has a `NAME.cameras.json` (NAME may be a prefix of the PLY's name), and
 every PLY below 8000 Gaussians over an orbit, is compressed with `--psnr` to each asked quality: without cameras, and
 with its training cameras where it has cameras. `--presets` adds the presets, whose aims are 35, 40, 45 and 54 dB, and
 `--guess` the presets of `--guess`.
-
-Each `--peer` encodes and decodes every model with cameras: the command writes a file whose size counts and a PLY. Its
-quality is measured in the same way, and a last table has our bytes over those of the best peer at equal reached quality,
-by the same lines. Where a peer's curve begins above a quality, its smallest file counts.
 
 The example `promise` of lexisplat-eval then scores each file against the original; see there for what views, pictures
 and tiles are. Pictures are as wide as the cameras' own, which the model was trained at, 1,600 pixels at most, unless
@@ -24,7 +20,6 @@ import argparse
 import json
 import math
 import resource
-import shlex
 import subprocess
 import sys
 import tempfile
@@ -105,18 +100,6 @@ def measure(binary, scorer, model, count, args):
             seconds.append(processor_seconds() - before)
         jobs = made
         sizes = [file.stat().st_size for file in files]
-        for peer in args.peer if cameras else []:
-            name, command = peer.split("=", 1)
-            encoded, decoded = Path(folder) / "encoded.bin", Path(folder) / f"{len(files)}.ply"
-            paths = {"model": model, "encoded": encoded, "decoded": decoded}
-            done = subprocess.run([word.format(**paths) for word in shlex.split(command)], capture_output=True, text=True)
-            if done.returncode:
-                print(f"{model.name}: {name}: {done.stderr.strip()[-200:]}", file=sys.stderr, flush=True)
-                continue
-            seconds.append(None)
-            jobs.append(("peer", name, None, []))
-            files.append(decoded)
-            sizes.append(encoded.stat().st_size)
         widths = widths_of(model, cameras)
         at = ",".join(map(str, widths))
         scored = subprocess.check_output([scorer, model, cameras or "orbit", at, *files], text=True).splitlines()
@@ -153,30 +136,6 @@ def table(rows):
               f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {smaller[0]} | {smaller[1]} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} | {r['cpu_seconds']:.0f} |", flush=True)
 
 
-def beside_peers(rows, asked):
-    """Our bytes over those of the best peer, at the qualities asked for."""
-    print("\n| scene | " + " | ".join(f"{way} {a:g}" for way in ("without", "with") for a in asked) + " | peers, bytes each @ dB |")
-    print("|" + "---|" * (2 + 2 * len(asked)))
-    for scene in dict.fromkeys(r["scene"] for r in rows if r["cameras"] == "peer"):
-        of = [r for r in rows if r["scene"] == scene]
-        peers = {}
-        for r in (r for r in of if r["cameras"] == "peer"):
-            # Settings of one peer are told apart by what follows its name.
-            peers.setdefault(r["asked"].split()[0], []).append((r["path"]["mean"], r["bytes"]))
-        def best(decibels):
-            smallest = lambda points: min(p[1] for p in points)
-            at = lambda points: smallest(points) if decibels <= min(p[0] for p in points) else bytes_at(points, decibels)
-            return min((b for b in map(at, peers.values()) if b), default=None)
-        cells = []
-        for way in ("none", "given"):
-            ours = [(r["path"]["mean"], r["bytes"]) for r in of if r["cameras"] == way and r["asked"].startswith("psnr")]
-            for a in asked:
-                mine, theirs = bytes_at(ours, a), best(a)
-                cells.append(f"{mine / theirs:.2f}" if mine and theirs else "")
-        each = ", ".join(f"{r['asked']}: {r['bytes'] / r['gaussians']:.1f} @ {r['path']['mean']:.1f}" for r in of if r["cameras"] == "peer")
-        print(f"| {scene} | {' | '.join(cells)} | {each} |")
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="+", type=Path)
@@ -185,7 +144,6 @@ def main():
     parser.add_argument("--presets", action="store_true")
     parser.add_argument("--guess", action="store_true")
     parser.add_argument("--binary", type=Path)
-    parser.add_argument("--peer", action="append", default=[])
     parser.add_argument("--json", type=Path)
     parser.set_defaults(failed=False)
     args = parser.parse_args()
@@ -206,9 +164,7 @@ def main():
         rows += measure(args.binary or target / "lexisplat", target / "examples" / "promise", model, count, args)
         if args.json:
             args.json.write_text(json.dumps(rows, indent=1))
-    table([r for r in rows if r["cameras"] != "peer"])
-    if args.peer:
-        beside_peers(rows, args.asked)
+    table(rows)
     sys.exit(args.failed)
 
 

@@ -1,7 +1,8 @@
-// The SPZ library of nianticlabs/spz, for formats_beside_peers.py.
+// The SPZ library of nianticlabs/spz, for formats_beside_peers.py and peers.py.
 //
 //   spz_reader read FILE.spz OUT.ply       what loadSpz reads, in the axes of a trainer's PLY
-//   spz_reader write FILE.ply OUT.spz V    FILE in version V, 1 to 4
+//   spz_reader write FILE.ply OUT.spz V [SH1 REST]    FILE in version V, 1 to 4, with so many bits for SH of degree 1
+//                                                     and above it, 1 to 8 [default: the library's]
 //   spz_reader time FILE.spz ROUNDS        seconds of the fastest loadSpz of the bytes in memory, and the Gaussians
 //
 // Build: c++ -O3 -std=c++17 -I SPZ/src/cc spz_reader.cpp SPZ/src/cc/*.cc -lz -lzstd -o spz_reader
@@ -63,10 +64,14 @@ int main(int count, char **words) {
     return 0;
   }
   if (task == "read" && count == 4) return writePly(spz::loadSpz(bytesOf(words[2]), toPly), words[3]) ? 0 : 1;
-  if (task == "write" && count == 5) {
+  if (task == "write" && (count == 5 || count == 7)) {
     spz::PackOptions pack;
     pack.version = std::atoi(words[4]);
     pack.from = spz::CoordinateSystem::RDF;
+    if (count == 7) {
+      pack.sh1Bits = static_cast<uint8_t>(std::atoi(words[5]));
+      pack.shRestBits = static_cast<uint8_t>(std::atoi(words[6]));
+    }
     return spz::saveSpz(spz::loadSplatFromPly(words[2], toPly), pack, words[3]) ? 0 : 1;
   }
   if (task == "time" && count == 4) {
@@ -81,6 +86,6 @@ int main(int count, char **words) {
     printf("%.4f %d\n", best, read);
     return 0;
   }
-  fprintf(stderr, "read FILE.spz OUT.ply | write FILE.ply OUT.spz V | time FILE.spz ROUNDS | versions\n");
+  fprintf(stderr, "read FILE.spz OUT.ply | write FILE.ply OUT.spz V [SH1 REST] | time FILE.spz ROUNDS | versions\n");
   return 2;
 }

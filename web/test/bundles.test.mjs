@@ -96,7 +96,7 @@ describe('bundles', { skip: missing }, () => {
     const installed = join(app, 'node_modules/lexisplat');
     mkdirSync(installed, { recursive: true });
     const { files } = JSON.parse(readFileSync(join(web, 'package.json'), 'utf8'));
-    // npm leaves out what does not exist: licences of others are gathered for a release only.
+    // npm leaves out files that do not exist: licences of others are gathered for a release only.
     for (const name of ['package.json', ...files].filter((name) => existsSync(join(web, name)))) cpSync(join(web, name), join(installed, name), { recursive: true });
     writeFileSync(join(app, 'package.json'), '{ "private": true, "type": "module" }');
     writeFileSync(join(app, 'main.js'), APP);

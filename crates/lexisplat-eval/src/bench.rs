@@ -170,7 +170,7 @@ fn run(
     for camera in cameras {
         progress.check()?;
         let mut samples: Vec<Vec<Sample>> = paths.iter().map(|_| Vec::new()).collect();
-        for number in 0..options.warmup + options.repeat.max(1) {
+        for number in 0..options.warmup.saturating_add(options.repeat.max(1)) {
             for (path, samples) in samples.iter_mut().enumerate() {
                 let sample = frame(path, camera)?;
                 if number >= options.warmup {
@@ -203,7 +203,7 @@ pub fn bench_gpu(
     let mut renderer = GpuRenderer::new(gpu)?;
     let uploaded = GpuScene::new(gpu, scene, path)?;
     let drawing = RenderOptions::default().with_background(options.background);
-    let times = run(&[path.name()], cameras, options, progress, |_, camera| {
+    let mut all = run(&[path.name()], cameras, options, progress, |_, camera| {
         let clock = Instant::now();
         let stats = renderer.draw(&uploaded, camera, &drawing)?.stats;
         let wall = clock.elapsed().as_secs_f64() * 1e3;
@@ -214,19 +214,18 @@ pub fn bench_gpu(
             entries: f64::from(stats.entries),
         })
     })?;
-    let bytes = uploaded.bytes();
-    let with_bytes = |times: PathTimes| PathTimes {
+    let (times, bytes) = (all.pop().unwrap_or_default(), uploaded.bytes());
+    Ok(PathTimes {
         geometry_bytes: bytes.geometry,
         sh_bytes: bytes.sh,
         shading_bytes: uploaded.shading_bytes(),
         shading_bytes_per_frame: times.visible * uploaded.shading_bytes(),
         geometry_bytes_per_frame: uploaded.looking_bytes(times.visible),
         ..times
-    };
-    Ok(times.into_iter().map(with_bytes).next().unwrap_or_default())
+    })
 }
 
-/// Times drawing on the processor, one frame of each scene in turn, so that what else the machine does slows all of them alike.
+/// Times drawing on the processor, one frame of each scene in turn, so that other work of the machine slows all of them alike.
 /// Reports [`Stage::Draw`] to `progress`, in views.
 ///
 /// # Errors

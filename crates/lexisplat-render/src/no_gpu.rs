@@ -13,7 +13,7 @@ pub use crate::gpu_report::{AdapterSummary, DrawStage, FrameStats, SceneBytes, S
 pub use crate::sh_path::ShPath;
 
 /// An open GPU, which does not exist in this build.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub enum Gpu {}
 
 /// A renderer on a GPU, which does not exist in this build.

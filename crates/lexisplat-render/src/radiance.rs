@@ -142,15 +142,18 @@ impl<'a> Radiance<'a> {
                     seen,
                     set,
                     #[inline(always)]
-                    |i, basis| dense(&rows[i], basis),
+                    |i, direction| dense(&rows[i], &rest_basis(self.shown, direction)),
                 );
             }
             Rest::Sparse { codes, atoms } => {
                 let atoms = atoms.as_chunks::<LEN>().0;
-                let mut reader = codes.rows();
-                for item in items {
-                    let (i, direction) = seen(item);
-                    let rest = match reader.row(i) {
+                let mut rows = codes.rows();
+                self.each(
+                    items,
+                    seen,
+                    set,
+                    #[inline(always)]
+                    |i, direction| match rows.row(i) {
                         CodedRest::Code(column) if column.is_empty() => [0.0; CHANNELS],
                         CodedRest::Code(column) => {
                             sparse::<N, LEN>(column, atoms, &rest_basis(self.shown, direction))
@@ -159,27 +162,25 @@ impl<'a> Radiance<'a> {
                             [row, ..] => dense(row, &rest_basis(self.shown, direction)),
                             [] => [0.0; CHANNELS],
                         },
-                    };
-                    set(item, self.finished(i, rest));
-                }
+                    },
+                );
             }
         }
     }
 
-    /// Colours `items`. `rest` returns the sum over all bands but the first for a Gaussian and a basis. The basis is zero above the
-    /// evaluated degree, which leaves those bands out.
+    /// Colours `items`. `rest` returns the sum over all bands but the first for a Gaussian and the direction to it. The basis is
+    /// zero above the evaluated degree, which leaves those bands out.
     #[inline(always)]
     fn each<T>(
         &self,
         items: &mut [T],
         seen: impl Fn(&T) -> (usize, [f32; 3]),
         set: impl Fn(&mut T, [f32; 3]),
-        rest: impl Fn(usize, &Basis) -> [f32; CHANNELS],
+        mut rest: impl FnMut(usize, [f32; 3]) -> [f32; CHANNELS],
     ) {
         for item in items {
             let (i, direction) = seen(item);
-            let rest = rest(i, &rest_basis(self.shown, direction));
-            set(item, self.finished(i, rest));
+            set(item, self.finished(i, rest(i, direction)));
         }
     }
 

@@ -83,7 +83,7 @@ pub use scene::source::SplatSource;
 pub use scene::splats::{FLAT_SCALE, Geometry, SURE_OPACITY, SceneMeta, Splats, flatten_scales};
 pub use scene::{sh, stats};
 pub use sparse::atoms::{Atoms, MAX_DIM};
-pub use sparse::codes::{CodedRest, Column, Escapes, Indices, Rows, SparseCodes, Values, reconstruct};
+pub use sparse::codes::{CodedRest, CodedRows, Column, Escapes, Indices, SparseCodes, Values, reconstruct};
 #[cfg(feature = "encode")]
 pub use sparse::compress::{CompressOptions, DEFAULT_TOLERANCE, compress};
 pub use sparse::dictionary::Dictionary;

@@ -260,15 +260,15 @@ impl<'a> Column<'a> {
 
 /// Reads rows of Gaussians that are near each other. It remembers where the columns of 64 Gaussians start.
 #[derive(Debug, Clone)]
-pub struct Rows<'a> {
+pub struct CodedRows<'a> {
     codes: &'a SparseCodes,
     /// The block of which `starts` is.
     block: usize,
-    /// Number of nonzeros of the block before each of its Gaussians. It is below 64 * 72, 72 being the longest atom.
+    /// Number of nonzeros of the block before each of its Gaussians: a sum of less than 64 bytes.
     starts: [u16; GAUSSIANS_PER_CHECKPOINT],
 }
 
-impl<'a> Rows<'a> {
+impl<'a> CodedRows<'a> {
     /// Returns the stored form of Gaussian `i`, as [`SparseCodes::row`] does.
     ///
     /// # Panics
@@ -278,7 +278,6 @@ impl<'a> Rows<'a> {
         let codes = self.codes;
         let len = usize::from(codes.counts[i]);
         if len == 0
-            && !codes.escapes.gaussians.is_empty()
             && let Some(row) = codes.escape(i)
         {
             return CodedRest::Exact(row);
@@ -462,7 +461,7 @@ impl SparseCodes {
     /// # Panics
     /// If `i` is not below [`Self::len`].
     #[must_use]
-    #[inline(always)]
+    #[inline]
     pub fn row(&self, i: usize) -> CodedRest<'_> {
         let len = usize::from(self.counts[i]);
         if len == 0
@@ -494,8 +493,8 @@ impl SparseCodes {
 
     /// Returns a reader of rows of Gaussians that are near each other.
     #[must_use]
-    pub fn rows(&self) -> Rows<'_> {
-        Rows { codes: self, block: usize::MAX, starts: [0; GAUSSIANS_PER_CHECKPOINT] }
+    pub fn rows(&self) -> CodedRows<'_> {
+        CodedRows { codes: self, block: usize::MAX, starts: [0; GAUSSIANS_PER_CHECKPOINT] }
     }
 
     /// Writes the SH-rest of Gaussian `i` into `out`. The values are exactly those of the decompressed scene.
