@@ -58,6 +58,8 @@ const MAX_VIEWS: usize = 150;
 /// Every `JUDGE_SHARE`-th given camera judges. All given cameras measure, so the judging views score up to 0.1 dB better
 /// than views that did not measure (docs/METHOD.md).
 const JUDGE_SHARE: usize = 2;
+/// Every `REFINED_JUDGE_SHARE`-th of the given cameras that judge also judges a refined file. The others are fitted to.
+const REFINED_JUDGE_SHARE: usize = 3;
 /// Number of views beside given cameras that measure too. Without them Gaussians that only such views show have coarse
 /// steps (docs/METHOD.md).
 const ASIDE: usize = 20;
@@ -315,17 +317,20 @@ impl PackingViews {
         self.fitting_to(part, FITTED_PIXELS.of(part) / PART_FITTED_SHARE)
     }
 
-    /// Returns the views to which everything is fitted: those that measure and do not judge, and some beside them and all around.
-    pub(crate) fn refining(&self, splats: &Splats) -> Vec<Camera> {
-        let hold = std::env::var("HOLD").ok().and_then(|v| v.parse::<usize>().ok()).unwrap_or(1000);
-        let judges: Vec<&Camera> = self.judging.iter().skip(hold / 2).step_by(hold).collect();
-        let mut views: Vec<Camera> =
-            self.measuring.iter().filter(|camera| !judges.contains(camera)).cloned().collect();
-        if self.given && std::env::var("ASIDE").is_ok() {
-            views.extend(aside(&splats.geometry, &self.measuring, ASIDE));
-            views.extend(surround(&splats.geometry, FITTED_AROUND, GENERATED_SIZE, GENERATED_DISTANCES));
+    /// Returns these views with fewer judges, so that more views are left to fit to. Found views that judge are never fitted
+    /// to and stay.
+    pub(crate) fn for_refining(mut self) -> Self {
+        if self.given {
+            self.judging = self.judging.into_iter().step_by(REFINED_JUDGE_SHARE).collect();
         }
-        sampled(views, REFINED_PIXELS)
+        self
+    }
+
+    /// Returns the views to which everything is fitted: those that measure and do not judge. Of sharp pictures only some squares are
+    /// drawn.
+    pub(crate) fn refining(&self) -> Vec<Camera> {
+        let free = self.measuring.iter().filter(|camera| !self.judging.contains(camera));
+        sampled(free.cloned().collect(), REFINED_PIXELS)
     }
 
     fn fitting_to(&self, splats: &Splats, pixels: u64) -> Vec<Camera> {

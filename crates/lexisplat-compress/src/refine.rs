@@ -1,23 +1,26 @@
-//! Fits everything of the Gaussians that stay to the pictures of the original: positions, shapes, opacities and colours.
+//! Fits the Gaussians that stay to the pictures of the original: positions, shapes, opacities and colours.
 //!
-//! Fewer Gaussians then show what all of them showed. The steps are those of Adam (Kingma and Ba, 2015), one view a step, with the
-//! rates of 3DGS training (INRIA `arguments/__init__.py`) for the positions at its end. A Gaussian moves only in steps whose view
-//! shows it.
+//! Fewer Gaussians then show what all of them showed. The steps are those of Adam (Kingma and Ba, "Adam: a method for
+//! stochastic optimization", 2015), one view a step. The sizes of steps are in the proportions of 3DGS training (INRIA
+//! `arguments/__init__.py`). A Gaussian moves only in steps whose view shows it (docs/METHOD.md, "Refining").
 
-use lexisplat::sh::{CHANNELS, rest_basis};
+use lexisplat::sh::rest_basis;
 use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, Differentiator, GaussianGradient, Image, PictureGradient, Renderer, Scene};
 use rayon::prelude::*;
 
 use crate::drawing::{DrawOptions, draw_views};
+use crate::effort::{Refine, RefineSteps};
 use crate::error::Result;
 
-/// Factors of the two moving averages of Adam. The second is shorter than usual, since a Gaussian takes few steps.
+/// Weights of the past in the moving averages of Adam. The second is smaller than the usual 0.999, since a Gaussian takes
+/// few steps.
 const FIRST: f32 = 0.9;
 const SECOND: f32 = 0.99;
-/// What keeps divisions finite.
+/// Added to roots of averages, so that divisions are finite.
 const TINY: f32 = 1e-15;
-/// Sizes of the first steps. Positions move by a share of the distances between cameras.
+/// Sizes of the first steps: of positions as a share of the [extent](extent) of the cameras, of the logarithms of scales, of
+/// quaternions, of the logits of opacities, and of SH coefficients.
 const POSITION: f32 = 3e-5;
 const SCALES: f32 = 7.5e-3;
 const ROTATION: f32 = 1.5e-3;
@@ -26,46 +29,103 @@ const BASE_COLOUR: f32 = 3.75e-3;
 const REST: f32 = 3.75e-4;
 /// Share of the first steps' size that the last steps have.
 const LAST: f32 = 0.1;
+/// Bits of the codes of a Gaussian's SH-rest each time its length doubles, about.
+const REST_BITS: f32 = 10.0;
+/// Squared error of pictures that is worth a bit, in squares of the overall step. Each value is coded to an error of about
+/// one square, and one more bit quarters the error: `2 ln 2`.
+const ERROR_OF_A_BIT: f32 = 1.386;
 /// Number of values of a Gaussian without its SH-rest.
 const PLAIN: usize = 14;
+
+/// The values that change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Free {
+    /// All values.
+    All,
+    /// SH-rest, base colours and opacities.
+    Radiance,
+    /// Base colours and opacities.
+    Appearance,
+}
+
+/// The cost of SH-rest in bits, which makes short rows pay.
+pub(crate) struct RestCost {
+    /// Root of the sensitivity of pictures to the colour of each Gaussian, over the overall step.
+    per_step: Vec<f32>,
+    /// The overall step.
+    step: f64,
+}
+
+impl RestCost {
+    /// Returns the cost at an overall `step`. `colour` is the sensitivity of pictures to the colour of each Gaussian.
+    pub(crate) fn new(colour: impl Iterator<Item = f32>, step: f64) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "a factor")]
+        let per_step = colour.map(|s| (f64::from(s).sqrt() / step) as f32).collect();
+        Self { per_step, step }
+    }
+
+    /// Returns the factor on the SH-rest of Gaussian `i` in the gradient of its cost. The row has this `length`. Errors are
+    /// sums over three channels.
+    fn slope(&self, i: usize, length: f32) -> f32 {
+        let per_step = self.per_step.get(i).copied().unwrap_or_default();
+        #[expect(clippy::cast_possible_truncation, reason = "a factor")]
+        let error_of_a_bit = 3.0 * ERROR_OF_A_BIT * (self.step * self.step) as f32;
+        // The cost is `REST_BITS * log2(1 + per_step * length)`.
+        let bits = REST_BITS * std::f32::consts::LOG2_E * per_step / (1.0 + per_step * length);
+        error_of_a_bit * bits / length.max(f32::MIN_POSITIVE.sqrt())
+    }
+}
 
 /// The views and pictures that a scene is fitted to.
 pub(crate) struct Refining {
     cameras: Vec<Camera>,
     targets: Vec<Image>,
+    /// Numbers of steps of the fits.
+    pub(crate) steps: RefineSteps,
 }
 
 impl Refining {
-    /// Draws pictures of `splats` from `cameras`, to fit to.
+    /// Draws pictures of `splats` from `cameras`, to fit to with this `effort`.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-    pub(crate) fn to(splats: &Splats, cameras: Vec<Camera>, progress: &dyn Progress) -> Result<Self> {
+    pub(crate) fn to(
+        splats: &Splats,
+        cameras: Vec<Camera>,
+        effort: Refine,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
         let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, progress)?;
-        Ok(Self { cameras, targets })
+        let pixels: usize = targets.iter().map(|target| target.pixels.len()).sum();
+        let steps = effort.steps(pixels as f64 / targets.len().max(1) as f64, splats.len());
+        Ok(Self { cameras, targets, steps })
     }
 
-    /// Fits `splats` in `steps` steps.
+    /// Fits the `free` values of `splats` in `steps` steps. Short rows of SH-rest pay by `cost`.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-    pub(crate) fn refine(&self, splats: &mut Splats, steps: usize, progress: &dyn Progress) -> Result<()> {
+    pub(crate) fn refine(
+        &self,
+        splats: &mut Splats,
+        free: Free,
+        steps: usize,
+        cost: &RestCost,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         if self.cameras.is_empty() {
             return Ok(());
         }
         let mut differentiator = Differentiator::default();
-        let mut fitted = Fitted::new(splats);
-        let extent = extent(&self.cameras);
-        progress.begin(Stage::Draw, steps as u64);
+        let mut adam = Adam::new(splats);
+        let sizes = Sizes::new(free, extent(&self.cameras));
+        progress.begin(Stage::Refine, steps as u64);
         for step in 0..steps {
             progress.check()?;
             let view = order(step, self.cameras.len());
-            let PictureGradient { gaussians, rows, .. } =
-                differentiator.gradient(splats, &self.cameras[view], &self.targets[view])?;
-            #[expect(clippy::cast_precision_loss, reason = "a share of steps")]
-            let rate = LAST.powf(step as f32 / steps as f32);
-            fitted.step(splats, &gaussians, &rows, &rates(rate, extent));
+            let gradient = differentiator.gradient(splats, &self.cameras[view], &self.targets[view])?;
+            adam.step(splats, &gradient, &sizes.after(step, steps), cost);
             progress.advance(1);
         }
         progress.end();
@@ -86,7 +146,7 @@ fn gcd(a: usize, b: usize) -> usize {
 }
 
 /// Returns the largest distance of a camera from the middle of all cameras, and a tenth more, as INRIA's trainer does
-/// (`getNerfppNorm`).
+/// (`scene/dataset_readers.py`, `getNerfppNorm`).
 fn extent(cameras: &[Camera]) -> f32 {
     #[expect(clippy::cast_precision_loss, reason = "a number of cameras")]
     let number = cameras.len() as f32;
@@ -97,26 +157,51 @@ fn extent(cameras: &[Camera]) -> f32 {
     1.1 * cameras.iter().map(distance).fold(0.0, f32::max)
 }
 
-/// Returns the sizes of a step, for each of the [`PLAIN`] values and for SH-rest.
-fn rates(rate: f32, extent: f32) -> ([f32; PLAIN], f32) {
-    let sizes = [(3, POSITION * extent), (3, SCALES), (4, ROTATION), (1, OPACITY), (3, BASE_COLOUR)];
-    let mut all = sizes.into_iter().flat_map(|(count, size)| std::iter::repeat_n(rate * size, count));
-    (std::array::from_fn(|_| all.next().unwrap_or_default()), rate * REST)
+/// The sizes of a step; 0 for values that stay.
+#[derive(Clone, Copy)]
+struct Sizes {
+    plain: [f32; PLAIN],
+    rest: f32,
+}
+
+impl Sizes {
+    fn new(free: Free, extent: f32) -> Self {
+        let shape = if free == Free::All { 1.0 } else { 0.0 };
+        let sizes = [
+            (3, shape * POSITION * extent),
+            (3, shape * SCALES),
+            (4, shape * ROTATION),
+            (1, OPACITY),
+            (3, BASE_COLOUR),
+        ];
+        let mut all = sizes.into_iter().flat_map(|(count, size)| std::iter::repeat_n(size, count));
+        let rest = if free == Free::Appearance { 0.0 } else { REST };
+        Self { plain: std::array::from_fn(|_| all.next().unwrap_or_default()), rest }
+    }
+
+    /// Returns the sizes of step `step` of `steps`.
+    #[expect(clippy::cast_precision_loss, reason = "a share of steps")]
+    fn after(self, step: usize, steps: usize) -> Self {
+        let rate = LAST.powf(step as f32 / steps as f32);
+        Self { plain: self.plain.map(|size| rate * size), rest: rate * self.rest }
+    }
 }
 
 /// The values of all Gaussians and the moving averages of their derivatives.
-struct Fitted {
+struct Adam {
     /// Number of values of a Gaussian.
     width: usize,
     /// For each Gaussian: the number of its steps, its values, the averages of derivatives, the averages of their squares.
     all: Vec<f32>,
     /// Number of the row of each Gaussian in the gradient, or [`NONE`].
     rows: Vec<u32>,
+    /// Number of steps.
+    steps: f32,
 }
 
 const NONE: u32 = u32::MAX;
 
-impl Fitted {
+impl Adam {
     fn new(splats: &Splats) -> Self {
         let rest = splats.degree.rest();
         let width = PLAIN + rest;
@@ -127,44 +212,48 @@ impl Fitted {
             let values = plain.into_iter().flatten().chain(&splats.sh_rest[i * rest..(i + 1) * rest]);
             own[1..].iter_mut().zip(values).for_each(|(own, value)| *own = *value);
         }
-        Self { width, all, rows: vec![NONE; splats.len()] }
+        Self { width, all, rows: vec![NONE; splats.len()], steps: 0.0 }
     }
 
     /// Moves the Gaussians of a gradient, and writes them to `splats`.
     fn step(
         &mut self,
         splats: &mut Splats,
-        gaussians: &[u32],
-        rows: &[GaussianGradient],
-        rates: &([f32; PLAIN], f32),
+        PictureGradient { gaussians, rows, .. }: &PictureGradient,
+        sizes: &Sizes,
+        cost: &RestCost,
     ) {
+        self.steps += 1.0;
         for (k, &i) in (0..).zip(gaussians) {
             self.rows[i as usize] = k;
         }
-        let (width, degree) = (self.width, splats.degree);
+        let (width, degree, all_steps) = (self.width, splats.degree, self.steps);
         let own = self.all.par_chunks_exact_mut(1 + 3 * width).zip(&self.rows);
-        own.for_each(|(own, &row)| {
+        own.enumerate().for_each(|(i, (own, &row))| {
             let Some(row) = rows.get(row as usize) else { return };
             let (steps, values) = own.split_at_mut(1);
             steps[0] += 1.0;
             let (values, averages) = values.split_at_mut(width);
             let (first, second) = averages.split_at_mut(width);
-            let (a, b) = (1.0 - FIRST.powf(steps[0]), 1.0 - SECOND.powf(steps[0]));
-            let mut go = |k: usize, derivative: f32, size: f32| {
-                first[k] += (1.0 - FIRST) * (derivative - first[k]);
-                second[k] += (1.0 - SECOND) * (derivative * derivative - second[k]);
-                values[k] -= size * (first[k] / a) / ((second[k] / b).sqrt() + TINY);
-            };
+            let bias = [1.0 - FIRST.powf(steps[0]), 1.0 - SECOND.powf(steps[0])];
             let GaussianGradient { position, scales, rotation, opacity, dc, colour, direction } = row;
-            let plain = [&position[..], scales, rotation, &[*opacity], dc];
-            for (k, &derivative) in plain.into_iter().flatten().enumerate() {
-                go(k, derivative, rates.0[k]);
+            let plain =
+                [&position[..], scales, rotation, std::slice::from_ref(opacity), dc].into_iter().flatten();
+            for (k, &derivative) in plain.enumerate().filter(|&(k, _)| sizes.plain[k] > 0.0) {
+                moved(&mut values[k], [&mut first[k], &mut second[k]], derivative, sizes.plain[k], bias);
             }
-            let per_channel = degree.rest_per_channel();
-            let basis = rest_basis(degree, *direction);
-            for c in 0..CHANNELS {
-                for k in 0..per_channel {
-                    go(PLAIN + c * per_channel + k, colour[c] * basis[k], rates.1);
+            if sizes.rest > 0.0 {
+                let per_channel = degree.rest_per_channel();
+                let basis = rest_basis(degree, *direction);
+                let length = values[PLAIN..].iter().map(|v| v * v).sum::<f32>().sqrt();
+                // The cost counts in every step, and the Gaussian moves only in those that show it.
+                let slope = cost.slope(i, length) * all_steps / steps[0];
+                let data = colour
+                    .iter()
+                    .flat_map(|by_colour| basis.iter().take(per_channel).map(move |b| by_colour * b));
+                for (k, data) in (PLAIN..).zip(data) {
+                    let derivative = data + slope * values[k];
+                    moved(&mut values[k], [&mut first[k], &mut second[k]], derivative, sizes.rest, bias);
                 }
             }
         });
@@ -182,4 +271,13 @@ impl Fitted {
             splats.sh_rest[i * rest..(i + 1) * rest].copy_from_slice(&values[PLAIN..]);
         }
     }
+}
+
+/// Moves a value against its derivative by about `size`, and updates the averages of its derivatives and of their squares.
+/// `bias` has the weights that the averages have gathered.
+#[inline(always)]
+fn moved(value: &mut f32, [first, second]: [&mut f32; 2], derivative: f32, size: f32, bias: [f32; 2]) {
+    *first += (1.0 - FIRST) * (derivative - *first);
+    *second += (1.0 - SECOND) * (derivative * derivative - *second);
+    *value -= size * (*first / bias[0]) / ((*second / bias[1]).sqrt() + TINY);
 }

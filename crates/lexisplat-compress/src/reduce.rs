@@ -1,0 +1,87 @@
+//! The scene that a refined file is packed from: fewer Gaussians, fitted to the pictures of all.
+
+use lexisplat::packed::Packer;
+use lexisplat::{Sensitivity, Splats};
+
+use crate::effort::RefineSteps;
+use crate::error::Result;
+use crate::fewer::Removal;
+use crate::judge::Judge;
+use crate::packing::{Packing, Quality};
+use crate::refine::{Free, Refining, RestCost};
+use crate::report::RefineReport;
+use crate::target::Target;
+
+/// Amount by which the quality of the Gaussians that stay may fall short of the quality asked for before they are refined,
+/// in dB. Refining gains about 5 dB, which quantisation uses up (docs/METHOD.md, "Refining").
+const BELOW: f64 = 0.0;
+/// Bytes of a Gaussian in a refined file, from which a size gives the number of Gaussians.
+const BYTES_EACH: f64 = 10.5;
+/// Quality at which short rows of SH-rest pay if the target is a size, in dB.
+const SIZE_DB: f64 = 40.0;
+
+impl Packing {
+    /// Removes Gaussians of `splats` until the rest shows about the quality asked for, or can have about the size asked for.
+    /// Then fits the rest to `refining`. Returns it with its sensitivity. `sensitivity` is the sensitivity of `splats`, and
+    /// `source_bytes` the size of the source.
+    ///
+    /// # Errors
+    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
+    pub(crate) fn reduced(
+        &self,
+        splats: &Splats,
+        sensitivity: Sensitivity,
+        removal: &mut Removal<'_>,
+        refining: &Refining,
+        judge: &mut Judge,
+        source_bytes: u64,
+    ) -> Result<(Splats, Sensitivity, RefineReport)> {
+        let progress = removal.progress;
+        let (mut splats, sensitivity, decibels) = match self.quality {
+            Quality::Target(target @ (Target::Size(_) | Target::Ratio(_))) => {
+                let bytes = target.bytes(source_bytes);
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a number of Gaussians"
+                )]
+                let most = (bytes / BYTES_EACH).ceil() as usize;
+                let made = removal.at_most(most.max(1), splats, sensitivity)?;
+                (made.0, made.1, SIZE_DB)
+            }
+            quality => {
+                let (decibels, least) = match quality {
+                    Quality::Target(Target::MinPsnr(decibels)) => (decibels, true),
+                    Quality::Target(target) => (target.asked(), false),
+                    Quality::Preset(preset) => (preset.decibels(), false),
+                };
+                let mut value = |splats: &Splats| {
+                    let score = judge.score(splats, progress)?;
+                    Ok(if least { score.least } else { score.judged })
+                };
+                let made = removal.down_to(
+                    decibels - BELOW + std::env::var("DELTA").map_or(0.0, |v| v.parse().unwrap()),
+                    splats,
+                    sensitivity,
+                    &mut value,
+                )?;
+                (made.0, made.1, decibels)
+            }
+        };
+        let RefineSteps { all, .. } = refining.steps;
+        let before = judge.score(&splats, progress)?.judged;
+        let step = Packer::new(&splats, &sensitivity, &self.options)?.step_for(decibels);
+        let cost = RestCost::new(sensitivity.colour.iter().copied(), step);
+        refining.refine(&mut splats, Free::All, all, &cost, progress)?;
+        let after = judge.score(&splats, progress)?.judged;
+        let report =
+            RefineReport { steps: all, gaussians: splats.len(), before_psnr: before, after_psnr: after };
+        let mut sensitivity = removal.views.sensitivity(removal.renderer, &splats, progress)?;
+        let trial =
+            |name: &str, d: f32| std::env::var(name).ok().and_then(|v| v.parse::<f32>().ok()).unwrap_or(d);
+        sensitivity.position.as_flattened_mut().iter_mut().for_each(|s| *s *= trial("GEOP", 1.0));
+        sensitivity.scale.as_flattened_mut().iter_mut().for_each(|s| *s *= trial("GEOS", 1.0));
+        sensitivity.rotation.as_flattened_mut().iter_mut().for_each(|s| *s *= trial("GEOR", 1.0));
+        Ok((splats, sensitivity, report))
+    }
+}
