@@ -281,3 +281,79 @@ fn moved(value: &mut f32, [first, second]: [&mut f32; 2], derivative: f32, size:
     *second += (1.0 - SECOND) * (derivative * derivative - *second);
     *value -= size * (*first / bias[0]) / ((*second / bias[1]).sqrt() + TINY);
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use lexisplat::Silent;
+    use lexisplat_render::orbit;
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+    use crate::Judge;
+
+    /// Half of a scene, and the fit of it to pictures of the whole.
+    fn half(steps: usize) -> (Splats, Splats, Refining) {
+        let all = scene(&SampleOptions::new(400, 3));
+        let mut some = all.clone();
+        some.retain(&(0..400).map(|i| i % 2 == 0).collect::<Vec<_>>());
+        let mut refining =
+            Refining::to(&all, orbit(&all.geometry, 8, 96, 72), Refine::Quick, &Silent).unwrap();
+        refining.steps.all = steps;
+        (all, some, refining)
+    }
+
+    #[test]
+    fn views_come_once_a_round_in_changing_order() {
+        for views in [1, 2, 7, 12] {
+            let round = |k: usize| (0..views).map(|i| order(k * views + i, views)).collect::<Vec<_>>();
+            assert!((0..5).all(|k| round(k).into_iter().collect::<HashSet<_>>().len() == views), "{views}");
+            assert!(views < 3 || round(0) != round(1), "{views}");
+        }
+    }
+
+    #[test]
+    fn the_fit_brings_pictures_nearer_to_the_original() {
+        let (all, some, refining) = half(160);
+        let views = orbit(&all.geometry, 5, 96, 72);
+        let mut judge = Judge::new(Renderer::cpu(), &all, &views, true, &Silent).unwrap();
+        let free = RestCost::new(std::iter::repeat_n(0.0, 200), 1.0);
+        let mut fitted = [Free::All, Free::Radiance, Free::Appearance].map(|values| {
+            let mut splats = some.clone();
+            refining.refine(&mut splats, values, 160, &free, &Silent).unwrap();
+            (judge.score(&splats, &Silent).unwrap().mean, splats)
+        });
+        let before = judge.score(&some, &Silent).unwrap().mean;
+        let quality = [0, 1, 2].map(|k| fitted[k].0);
+        assert!(
+            quality[0] > quality[1] && quality[1] > quality[2] && quality[2] > before + 1.0,
+            "{before} {quality:?}"
+        );
+        // Values that are not free stay.
+        let kept = |splats: &Splats| {
+            let g = &splats.geometry;
+            (g.positions.clone(), g.scales.clone(), g.rotations.clone())
+        };
+        assert!(kept(&fitted[0].1) != kept(&some) && kept(&fitted[1].1) == kept(&some));
+        assert_eq!(fitted[2].1.sh_rest, some.sh_rest);
+        // A cost makes rows of SH-rest shorter.
+        let length = |splats: &Splats| splats.sh_rest.iter().map(|v| f64::from(v * v)).sum::<f64>();
+        let cost = RestCost::new(std::iter::repeat_n(1e-4, 200), 1e-3);
+        refining.refine(&mut fitted[2].1, Free::Radiance, 160, &cost, &Silent).unwrap();
+        assert!(length(&fitted[2].1) < 0.9 * length(&fitted[1].1));
+    }
+
+    #[test]
+    fn threads_change_nothing() {
+        let (_, some, refining) = half(20);
+        let fitted = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut splats = some.clone();
+            let cost = RestCost::new(std::iter::repeat_n(1e-6, 200), 1e-3);
+            pool.install(|| refining.refine(&mut splats, Free::All, 20, &cost, &Silent)).unwrap();
+            splats
+        };
+        assert_eq!(fitted(1), fitted(3));
+    }
+}

@@ -392,6 +392,32 @@ mod tests {
     }
 
     #[test]
+    fn other_sh_rest_changes_nothing_else() {
+        let splats = crate::support::testing::scene(700, 5);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
+        let options = PackOptions::default();
+        let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
+        let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
+        let model =
+            |of: &Quantised<'_>| of.finish(None, None, &Silent).unwrap().0.unpack().unwrap().into_splats();
+        let own = model(&quantised);
+        // The scene's own rows in the order of the file give the same file.
+        let rows: Vec<f32> =
+            quantised.sources().iter().flat_map(|g| splats.rest(g.index())).copied().collect();
+        let same = quantised.with_sh_rest(&rows, &Silent).unwrap();
+        assert_eq!(model(&same), own);
+        let halved: Vec<f32> = rows.iter().map(|v| 0.5 * v).collect();
+        let other = model(&quantised.with_sh_rest(&halved, &Silent).unwrap());
+        assert_eq!(other.geometry, own.geometry);
+        let error = |rows: &[f32]| {
+            other.sh_rest.iter().zip(rows).map(|(a, b)| f64::from((a - b) * (a - b))).sum::<f64>()
+        };
+        assert!(error(&halved) < 0.1 * error(&rows), "{} {}", error(&halved), error(&rows));
+        assert!(quantised.with_sh_rest(&rows[1..], &Silent).is_err());
+        assert!(quantised.with_sh_rest(&vec![f32::NAN; rows.len()], &Silent).is_err());
+    }
+
+    #[test]
     fn appearances_that_do_not_fit_are_refused() {
         let splats = crate::support::testing::scene(50, 5);
         let sensitivity = Sensitivity::guess(&splats.geometry);
