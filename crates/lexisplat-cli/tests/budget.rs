@@ -1,16 +1,19 @@
 //! Levels of detail, and drawing within a budget.
 
-use crate::folder::Folder;
+use crate::folder::{Files, Folder};
 use lexisplat_sample::{SampleOptions, scene};
 
 /// Gaussians of a scene that has two layers, and two chunks of the second.
 const LAYERED: usize = 20_000;
 
 fn layered() -> Folder {
-    let folder = Folder::new();
-    lexisplat::ply::write(&folder.path("large.ply"), &scene(&SampleOptions::new(LAYERED, 1))).unwrap();
-    folder.run(&["compress", "large.ply", "--guess", "--lod", "--quiet"]);
-    folder
+    static FILES: Files = Files::new();
+    Folder::with(&FILES, || {
+        let folder = Folder::new();
+        lexisplat::ply::write(&folder.path("large.ply"), &scene(&SampleOptions::new(LAYERED, 1))).unwrap();
+        folder.run(&["compress", "large.ply", "--guess", "--lod", "--quiet"]);
+        folder
+    })
 }
 
 #[test]

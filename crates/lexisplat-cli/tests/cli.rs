@@ -118,7 +118,7 @@ fn pictures_sort_as_the_cameras_do() {
 
 #[test]
 fn pipes_carry_scenes() {
-    let folder = Folder::few();
+    let folder = Folder::least();
     let scene = std::fs::read(folder.path("scene.ply")).unwrap();
     // A pipe has no folder in which cameras could lie.
     let cameras = folder.path("cameras.json");
@@ -142,7 +142,7 @@ fn pipes_carry_scenes() {
 
 #[test]
 fn threads_do_not_change_the_file() {
-    let folder = Folder::few();
+    let folder = Folder::least();
     for threads in ["1", "2"] {
         folder.run(&["compress", "scene.ply", "-o", &format!("{threads}.lexi"), "--threads", threads]);
     }
@@ -354,7 +354,7 @@ fn a_cap_on_nonzeros_lifts_the_promise() {
 
 #[test]
 fn quiet_is_silent_and_completions_are_not() {
-    let folder = Folder::few();
+    let folder = Folder::least();
     let output =
         lexisplat().current_dir(folder.0.path()).args(["compress", "scene.ply", "--quiet"]).output().unwrap();
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
@@ -365,7 +365,7 @@ fn quiet_is_silent_and_completions_are_not() {
 
 #[test]
 fn the_program_and_each_command_have_a_manual_page() {
-    let folder = Folder::few();
+    let folder = Folder::least();
     let program = folder.run(&["man"]);
     // Roff writes a hyphen as \\-.
     assert!(program.contains(".TH lexisplat 1") && program.contains(r"lexisplat\-compress(1)"), "{program}");

@@ -3,7 +3,7 @@
 use lexisplat::{FLAT_SCALE, Offset, ply};
 use serde_json::Value;
 
-use crate::folder::{Folder, GAUSSIANS, read};
+use crate::folder::{FEW, Folder, GAUSSIANS, read};
 
 /// Outputs of `convert`, and the format that `info` names.
 const OUTPUTS: [(&str, &str); 6] = [
@@ -23,18 +23,18 @@ fn number(value: &Value) -> f64 {
 
 #[test]
 fn every_format_is_written_and_every_command_reads_it() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     for (output, format) in OUTPUTS {
         let report = folder.json(&["convert", "scene.ply", output]);
         assert_eq!(report["format"], format);
-        assert_eq!(number(&report["gaussians"]), GAUSSIANS as f64);
+        assert_eq!(number(&report["gaussians"]), FEW as f64);
         assert_eq!(report["bytes"], std::fs::read(folder.path(output)).unwrap().len());
         let info = folder.json(&["info", output]);
-        assert_eq!(number(&info["gaussians"]), GAUSSIANS as f64, "{output}");
+        assert_eq!(number(&info["gaussians"]), FEW as f64, "{output}");
         // Nothing but the content tells what it is.
         std::fs::copy(folder.path(output), folder.path("unnamed")).unwrap();
         folder.run(&["convert", "unnamed", "back.ply", "--overwrite"]);
-        assert_eq!(read(&folder.path("back.ply")).len(), GAUSSIANS);
+        assert_eq!(read(&folder.path("back.ply")).len(), FEW);
         if format == "lexi" {
             continue;
         }
@@ -43,14 +43,14 @@ fn every_format_is_written_and_every_command_reads_it() {
         folder.run(&[&["render", output, "-o", &format!("{format}-views")][..], &draw].concat());
         let packed = format!("{format}.lexi");
         folder.run(&["compress", output, "--guess", "--quiet", "-o", &packed]);
-        assert_eq!(number(&folder.json(&["info", &packed])["gaussians"]), GAUSSIANS as f64);
+        assert_eq!(number(&folder.json(&["info", &packed])["gaussians"]), FEW as f64);
     }
 }
 
 /// 2D Gaussians have a third size of zero, and go wherever others go.
 #[test]
 fn flat_scenes_go_everywhere() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let mut splats = read(&folder.path("scene.ply"));
     splats.geometry.scales.iter_mut().for_each(|scales| scales[2] = f32::NEG_INFINITY);
     ply::write(&folder.path("flat.ply"), &splats).unwrap();
@@ -201,7 +201,7 @@ fn surveys_keep_their_places() {
 /// Cameras are in the world of the source, and pictures are those of the scene at the origin.
 #[test]
 fn cameras_of_surveys_are_in_their_world() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let near = read(&folder.path("scene.ply"));
     std::fs::write(folder.path("far.ply"), surveyed(&near).0).unwrap();
     for (name, far) in [("near.json", [0.0; 3]), ("far.json", FAR)] {

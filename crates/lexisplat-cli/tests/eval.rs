@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::folder::{Folder, lexisplat, read};
+use crate::folder::{FEW, Folder, lexisplat, read};
 use assert_cmd::cargo::cargo_bin;
 use lexisplat::ply;
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ const PATIENCE: Duration = Duration::from_secs(300);
 /// Returns a folder with photos and their nine cameras, as a `cameras.json` and as a COLMAP model. Two of the cameras are
 /// test views, by the order of their names.
 fn with_photos() -> Folder {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let mut cameras = Vec::new();
     let mut images = String::from("# made up\n");
     for i in 0..9_u8 {
@@ -169,7 +169,7 @@ fn a_sweep_leaves_tables_figures_and_a_page() {
 
 #[test]
 fn a_killed_sweep_is_finished_by_the_next() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let arguments =
         [&["sweep", "scene.ply", "--no-fps", "--orbit", "2", "--width", "64", "-o", "out"][..], &SMALL]
             .concat();
@@ -205,7 +205,7 @@ fn a_killed_sweep_is_finished_by_the_next() {
 
 #[test]
 fn models_given_by_path_can_be_named() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let rest = ["--tol", "0.2", "--no-fps", "--orbit", "2", "--width", "64", "--device", "cpu", "-o", "out"];
     std::fs::copy(folder.path("scene.ply"), folder.path("copy.ply")).unwrap();
     let named = ["sweep", "scene.ply", "copy.ply", "--name", "a\u{1b}[2Jb"];
@@ -220,7 +220,7 @@ fn models_given_by_path_can_be_named() {
 
 #[test]
 fn a_manifest_skips_what_is_not_there() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let text = "[[scene]]\nname = \"a\"\nmethod = \"3dgs\"\nmodel = \"scene.ply\"\n\
                 [[scene]]\nname = \"b\"\nmethod = \"pixelgs\"\nmodel = \"gone.ply\"\n";
     std::fs::write(folder.path("scenes.toml"), text).unwrap();

@@ -1,6 +1,6 @@
 //! Parts of packed files: their first bytes, fewer parts of SH, and what `info` says about layers.
 
-use crate::folder::{Folder, GAUSSIANS, read};
+use crate::folder::{Files, Folder, GAUSSIANS, read};
 use lexisplat_sample::{SampleOptions, scene};
 use serde_json::Value;
 
@@ -9,10 +9,13 @@ const LAYERED: usize = 9000;
 
 /// A folder with a packed file of two layers.
 fn layered() -> Folder {
-    let folder = Folder::new();
-    lexisplat::ply::write(&folder.path("large.ply"), &scene(&SampleOptions::new(LAYERED, 1))).unwrap();
-    folder.run(&["compress", "large.ply", "--guess", "--quiet"]);
-    folder
+    static FILES: Files = Files::new();
+    Folder::with(&FILES, || {
+        let folder = Folder::new();
+        lexisplat::ply::write(&folder.path("large.ply"), &scene(&SampleOptions::new(LAYERED, 1))).unwrap();
+        folder.run(&["compress", "large.ply", "--guess", "--quiet"]);
+        folder
+    })
 }
 
 fn number(value: &Value) -> f64 {

@@ -11,7 +11,7 @@ fn stated(folder: &Folder, file: &str) -> Option<String> {
 
 #[test]
 fn a_file_states_the_best_view_or_the_one_that_is_given() {
-    let folder = Folder::few();
+    let folder = Folder::least();
     folder.run(&["compress", "scene.ply", "-o", "best.lexi", "--preset", "small", "--quiet"]);
     let best = stated(&folder, "best.lexi").unwrap();
     // It is the view of one of the cameras beside the scene.
@@ -41,7 +41,7 @@ fn a_file_states_the_best_view_or_the_one_that_is_given() {
 
 #[test]
 fn another_view_changes_nothing_else() {
-    let folder = Folder::few();
+    let folder = Folder::least();
     for layout in ["packed", "f16"] {
         folder.run(&["compress", "scene.ply", "-o", "a.lexi", "--layout", layout, "--overwrite", "--quiet"]);
         folder.run(&["convert", "a.lexi", "b.lexi", "--view", VIEW, "--overwrite", "--quiet"]);

@@ -49,11 +49,10 @@ fn devices_are_listed_with_what_auto_leaves_out() {
 
 #[test]
 fn both_renderers_draw_the_same_pictures() {
-    let folder = Folder::new();
+    let folder = Folder::guessed();
     if !gpu(&folder) {
         return;
     }
-    folder.run(&["compress", "scene.ply", "-q"]);
     for file in ["scene.ply", "scene.lexi"] {
         for device in ["cpu", "gpu"] {
             let out = format!("{file}-{device}");
@@ -89,11 +88,10 @@ fn both_renderers_draw_the_same_pictures() {
 
 #[test]
 fn a_file_says_when_a_gpu_looked_at_the_scene() {
-    let folder = Folder::new();
+    let folder = Folder::least();
     if !gpu(&folder) {
         return;
     }
-    folder.add_cameras(6);
     let compress = |out: &str, device: &str| {
         let given = ["--cameras", "cameras.json"];
         folder.json(

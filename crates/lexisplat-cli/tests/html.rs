@@ -11,15 +11,9 @@ fn held(page: &str, mark: &str) -> Vec<u8> {
     BASE64.decode(after.split(['<', '"']).next().unwrap()).unwrap()
 }
 
-fn compressed() -> Folder {
-    let folder = Folder::new();
-    folder.run(&["compress", "scene.ply", "--guess", "--quiet"]);
-    folder
-}
-
 #[test]
 fn a_page_holds_the_scene_and_a_picture_of_it() {
-    let folder = compressed();
+    let folder = Folder::guessed();
     let report = folder.json(&["html", "scene.lexi"]);
     let page = std::fs::read_to_string(folder.path("scene.html")).unwrap();
     assert_eq!(report["bytes"], page.len());
@@ -42,7 +36,7 @@ fn a_page_holds_the_scene_and_a_picture_of_it() {
 
 #[test]
 fn two_scenes_are_compared_and_options_are_kept() {
-    let folder = compressed();
+    let folder = Folder::guessed();
     let args = ["html", "scene.ply", "scene.lexi", "-o", "both.html", "--title", "a & b", "--no-poster"];
     folder.run(&[&args[..], &["--tools", "--still", "--actions", "mode=wipe,split=0.25"]].concat());
     let page = std::fs::read_to_string(folder.path("both.html")).unwrap();
@@ -106,7 +100,7 @@ fn stored(archive: &[u8]) -> Vec<(String, Vec<u8>)> {
 
 #[test]
 fn a_page_without_a_scene_is_a_viewer_and_what_is_no_scene_is_refused() {
-    let folder = compressed();
+    let folder = Folder::guessed();
     folder.run(&["html", "--quiet"]);
     let viewer = std::fs::read(folder.path("viewer.html")).unwrap();
     assert_eq!(folder.run(&["html", "-o", "-"]).into_bytes(), viewer);

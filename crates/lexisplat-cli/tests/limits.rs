@@ -9,7 +9,7 @@ const LIMIT: i32 = 6;
 fn every_command_keeps_to_the_limits_given() {
     let folder = Folder::new();
     folder.run(&["compress", "scene.ply", "--tol", "0.1", "--save-dictionary", "d.lexi", "-o", "exact.lexi"]);
-    folder.run(&["compress", "scene.ply", "--preset", "small", "--keep-all", "-o", "packed.lexi"]);
+    folder.run(&["compress", "scene.ply", "--guess", "--keep-all", "-o", "packed.lexi"]);
     let before = folder.names();
     let (enough, less) = (format!("gaussians={GAUSSIANS}"), format!("gaussians={}", GAUSSIANS - 1));
     let small: &[&str] = &["--orbit", "1", "--width", "16", "--device", "cpu"];

@@ -1,14 +1,14 @@
 //! Scenes that are said to be larger than memory, as a user packs them.
 
 use crate::folder;
-use crate::folder::{Folder, GAUSSIANS, read};
+use crate::folder::{FEW, Folder, read};
 
 /// Less than any scene takes.
 const LITTLE: [&str; 2] = ["--memory", "100kB"];
 
 #[test]
 fn a_scene_larger_than_memory_is_packed_in_parts() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let report = folder.json(&[&["compress", "scene.ply", "--keep-order"], &LITTLE[..]].concat());
     assert_eq!((&report["sensitivity"], &report["layout"]), (&"views".into(), &"packed".into()));
     let bytes = std::fs::read(folder.path("scene.lexi")).unwrap();
@@ -24,24 +24,20 @@ fn a_scene_larger_than_memory_is_packed_in_parts() {
     assert_eq!(info["lexi"]["order_kept"], true);
     folder.run(&["decompress", "scene.lexi", "-o", "back.ply"]);
     let (before, after) = (read(&folder.path("scene.ply")), read(&folder.path("back.ply")));
-    assert_eq!(after.len(), GAUSSIANS);
+    assert_eq!(after.len(), FEW);
     let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
     assert!(!before.geometry.positions.iter().zip(&after.geometry.positions).any(far), "out of order");
-    let text = folder.run(
-        &[&["compress", "scene.ply", "--preset", "small", "--overwrite", "--all"], &LITTLE[..]].concat(),
-    );
+    let text = folder
+        .run(&[&["compress", "scene.ply", "--psnr", "25", "--overwrite", "--all"], &LITTLE[..]].concat());
     assert!(text.contains("part by part") && text.contains("left out"), "{text}");
     let info = folder.json(&["info", "scene.lexi"]);
-    assert_eq!(
-        info["gaussians"].as_u64().unwrap() + info["lexi"]["removed"].as_u64().unwrap(),
-        GAUSSIANS as u64
-    );
+    assert_eq!(info["gaussians"].as_u64().unwrap() + info["lexi"]["removed"].as_u64().unwrap(), FEW as u64);
     assert_eq!(folder.names(), ["back.ply", "scene.lexi", "scene.ply"]);
 }
 
 #[test]
 fn what_shows_can_be_guessed_whatever_the_memory() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let report = folder.json(&["compress", "scene.ply", "--guess", "-o", "much.lexi"]);
     assert_eq!((&report["sensitivity"], &report["look_seconds"]), (&"guess".into(), &0.0.into()));
     let text =

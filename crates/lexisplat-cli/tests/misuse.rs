@@ -13,8 +13,7 @@ const USAGE: i32 = 2;
 
 #[test]
 fn an_output_of_another_format_is_refused() {
-    let folder = Folder::new();
-    folder.run(&["compress", "scene.ply", "--guess", "-q"]);
+    let folder = Folder::guessed();
     let before = folder.names();
     for (arguments, advice) in [
         (["compress", "scene.ply", "-o", "a.ply"], "give -o a.lexi; `lexisplat decompress` makes a PLY"),
@@ -50,8 +49,7 @@ fn a_folder_is_no_output() {
 
 #[test]
 fn an_input_that_is_done_already_is_named() {
-    let folder = Folder::new();
-    folder.run(&["compress", "scene.ply", "--guess", "-q"]);
+    let folder = Folder::guessed();
     let error = folder.fail(&["compress", "scene.lexi"], RANGE);
     assert!(error.contains("scene.lexi is already a .lexi file"), "{error}");
     assert!(error.contains("help: `lexisplat decompress scene.lexi` makes a PLY"), "{error}");
@@ -62,8 +60,7 @@ fn an_input_that_is_done_already_is_named() {
 
 #[test]
 fn an_input_of_the_other_kind_is_named_by_its_content() {
-    let folder = Folder::new();
-    folder.run(&["compress", "scene.ply", "--guess", "-q"]);
+    let folder = Folder::guessed();
     for (arguments, kind, help) in [
         (["decompress", "scene.ply", "-o", "other.ply"], "a PLY", "`lexisplat compress` makes a .lexi"),
         (["compress", "scene.lexi", "-o", "other.lexi"], "a .lexi", "`lexisplat decompress` makes a PLY"),

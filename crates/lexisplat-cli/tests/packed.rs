@@ -1,7 +1,6 @@
 //! Packed files as a user makes and reads them.
 
-use crate::folder;
-use crate::folder::{Folder, lexisplat, read};
+use crate::folder::{FEW, Folder, LEAST, lexisplat, read};
 use serde_json::Value;
 
 /// Few views, small: enough to tell qualities apart.
@@ -22,7 +21,7 @@ fn mean_psnr(folder: &Folder, file: &str) -> f64 {
 
 #[test]
 fn presets_are_ordered_and_the_default_is_balanced() {
-    let folder = Folder::few();
+    let folder = Folder::least();
     let (mut last_bytes, mut last_psnr) = (0, 0.0);
     for preset in ["small", "balanced", "high", "archive"] {
         let file = format!("{preset}.lexi");
@@ -46,7 +45,7 @@ fn presets_are_ordered_and_the_default_is_balanced() {
 
 #[test]
 fn a_quality_is_reached_and_recorded() {
-    let folder = Folder::few();
+    let folder = Folder::of(LEAST);
     for (option, key) in [("--psnr", "judged_psnr"), ("--min-psnr", "min_psnr")] {
         let report = folder.json(&["compress", "scene.ply", "--no-cameras", option, "38", "--overwrite"]);
         let target = &report["target"];
@@ -72,7 +71,7 @@ fn a_quality_is_reached_and_recorded() {
 
 #[test]
 fn comparing_without_cameras_looks_from_where_compress_judged() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let report = folder.json(&["compress", "scene.ply"]);
     let views = report["reached"]["views"].to_string();
     let score = folder.json(&["compare", "scene.ply", "scene.lexi", "--orbit", &views, "--device", "cpu"]);
@@ -87,7 +86,7 @@ fn comparing_without_cameras_looks_from_where_compress_judged() {
 
 #[test]
 fn the_kind_of_scene_can_be_given() {
-    let folder = Folder::few();
+    let folder = Folder::least();
     let file = |kind: &[&str]| {
         folder.json(&[&["compress", "scene.ply", "--overwrite"], kind].concat());
         std::fs::read(folder.path("scene.lexi")).unwrap()
@@ -157,7 +156,7 @@ fn a_size_is_never_exceeded() {
 
 #[test]
 fn given_cameras_are_searched_with() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     let cameras: Vec<Value> = (0..12)
         .map(|i| {
             let x = 0.2 * f64::from(i) - 1.0;
@@ -177,7 +176,7 @@ fn given_cameras_are_searched_with() {
 
 #[test]
 fn the_tolerance_holds_in_packed_files() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     for tol in ["0.05", "0.2"] {
         let report = folder.json(&[
             "compress",
@@ -203,7 +202,7 @@ fn the_tolerance_holds_in_packed_files() {
 
 #[test]
 fn info_says_what_a_packed_file_is_made_of() {
-    let folder = Folder::new();
+    let folder = Folder::of(LEAST);
     let text = folder.run(&["compress", "scene.ply", "--all"]);
     let lines: Vec<&str> = text.lines().collect();
     assert!(
@@ -242,26 +241,26 @@ fn what_is_left_out_is_reported() {
     let report = folder.json(&[&BY_CAMERAS[..], &["--preset", "small"]].concat());
     let removed = number(&report["removed"]);
     assert!(removed > 0.0);
-    assert_eq!(number(&report["gaussians"]) + removed, folder::FEW as f64);
+    assert_eq!(number(&report["gaussians"]) + removed, FEW as f64);
     assert_eq!(folder.json(&["info", "scene.lexi"])["lexi"]["removed"], report["removed"]);
     assert!(folder.run(&["info", "scene.lexi"]).contains("left out"));
     for keep in ["--keep-all", "--keep-order"] {
         let report = folder.json(&[&BY_CAMERAS[..], &["--preset", "small", keep, "--overwrite"]].concat());
-        assert_eq!((number(&report["removed"]), number(&report["gaussians"])), (0.0, folder::FEW as f64));
+        assert_eq!((number(&report["removed"]), number(&report["gaussians"])), (0.0, FEW as f64));
         assert!(!folder.run(&["info", "scene.lexi"]).contains("left out"));
     }
 }
 
 #[test]
 fn a_limit_on_gaussians_is_kept() {
-    let folder = Folder::few();
-    let most = folder::FEW / 4;
+    let folder = Folder::least();
+    let most = LEAST / 4;
     let limit = most.to_string();
     let limited = [&BY_CAMERAS[..], &["--preset", "small", "--max-gaussians", &limit]].concat();
     let report = folder.json(&limited);
     let gaussians = number(&report["gaussians"]);
     assert!(gaussians <= most as f64 && gaussians > 0.0, "{gaussians}");
-    assert_eq!(gaussians + number(&report["removed"]), folder::FEW as f64);
+    assert_eq!(gaussians + number(&report["removed"]), LEAST as f64);
     let first = std::fs::read(folder.path("scene.lexi")).unwrap();
     folder.run(&[&limited[..], &["--overwrite"]].concat());
     assert!(std::fs::read(folder.path("scene.lexi")).unwrap() == first);
@@ -318,7 +317,7 @@ fn a_scene_in_other_units_is_packed_as_well() {
 
 #[test]
 fn a_near_plane_that_hides_the_scene_is_told() {
-    let folder = Folder::new();
+    let folder = Folder::of(FEW);
     folder.run(&["convert", "scene.ply", "small.ply", "--scale", "0.01"]);
     let cameras: Vec<Value> = [-0.004, 0.0, 0.004]
         .map(|x| {

@@ -5,7 +5,7 @@ use crate::folder::{Folder, lexisplat};
 /// Drivers print to standard error on machines without a desktop. Nothing of that reaches the user.
 #[test]
 fn commands_without_a_window_are_silent_without_a_desktop() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     for arguments in [
         &["devices"][..],
         &["devices", "--json"],

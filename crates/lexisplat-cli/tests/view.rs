@@ -6,7 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use crate::folder::{Folder, lexisplat};
+use crate::folder::{Folder, LEAST, lexisplat};
 use image::RgbImage;
 use lexisplat_testing::{Need, missing};
 use serde_json::Value;
@@ -217,7 +217,7 @@ fn files_of_other_formats_are_shown() {
 
 #[test]
 fn the_window_compresses_as_the_command_does() {
-    let folder = Folder::new();
+    let folder = Folder::of(LEAST);
     folder.run(&["compress", "scene.ply", "--preset", "small", "-o", "small.lexi", "--quiet"]);
     folder.run(&["compress", "scene.ply", "--tol", "0.2", "-o", "tolerance.lexi", "--quiet"]);
     let actions = "compress=small,report,tolerance=0.2,report,quit";

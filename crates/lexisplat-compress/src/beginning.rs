@@ -72,8 +72,8 @@ impl<'a> From<&'a dyn SplatSource> for Source<'a> {
 /// ```
 /// use lexisplat_sample::{SampleOptions, scene};
 ///
-/// let splats = scene(&SampleOptions::new(2000, 0));
-/// let (file, report) = lexisplat_compress::compress(&splats).psnr(36.0).to_bytes()?;
+/// let splats = scene(&SampleOptions::new(100, 0));
+/// let (file, report) = lexisplat_compress::compress(&splats).psnr(38.0).to_bytes()?;
 /// assert_eq!(report.file_bytes, file.len() as u64);
 /// # Ok::<(), lexisplat_compress::Error>(())
 /// ```

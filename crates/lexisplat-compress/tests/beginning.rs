@@ -24,7 +24,7 @@ fn a_file_has_the_cameras_beside_it() {
     let folder = tempfile::tempdir().unwrap();
     let [scene_path, cameras_path, out] =
         ["scene.ply", "cameras.json", "scene.lexi"].map(|name| folder.path().join(name));
-    let splats = scene(&SampleOptions::new(200, 0));
+    let splats = scene(&SampleOptions::new(100, 0));
     ply::write(&scene_path, &splats).unwrap();
     let cameras = orbit(&splats.geometry, 6, 96, 64);
     std::fs::write(&cameras_path, cameras_json(&cameras)).unwrap();

@@ -13,6 +13,11 @@ fn sample() -> Splats {
     scene(&SampleOptions::new(800, 0))
 }
 
+/// A scene of which views are looked for sooner.
+fn small() -> Splats {
+    scene(&SampleOptions::new(300, 0))
+}
+
 fn run(packing: Packing, splats: &Splats) -> (Vec<u8>, CompressionReport) {
     let mut file = Vec::new();
     let report = Compression::from(packing).run(splats, &mut file, &Silent).unwrap();
@@ -21,7 +26,7 @@ fn run(packing: Packing, splats: &Splats) -> (Vec<u8>, CompressionReport) {
 
 #[test]
 fn the_kind_of_scene_says_where_views_are() {
-    let splats = sample();
+    let splats = small();
     let views =
         |viewpoints| PackingViews::generated(viewpoints, &mut Renderer::cpu(), &splats, &Silent).unwrap();
     let [object, room] = [Viewpoints::Object, Viewpoints::Room].map(views);

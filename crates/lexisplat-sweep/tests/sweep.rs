@@ -13,7 +13,7 @@ use lexisplat_sweep::{
     Entry, Method, PictureFiles, Point, Results, Setting, SweepOptions, SweepProgress, parse_manifest, sweep,
 };
 
-const GAUSSIANS: usize = 800;
+const GAUSSIANS: usize = 300;
 
 #[derive(Default)]
 struct Count(AtomicU64);

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use assert_cmd::Command;
 use lexisplat::ply::{self, ReadOptions};
@@ -13,6 +14,11 @@ use serde_json::Value;
 pub(crate) const GAUSSIANS: usize = 1500;
 /// Gaussians of the scene of tests that pack it again and again.
 pub(crate) const FEW: usize = 400;
+/// Gaussians of the scene of tests that ask nothing of its size.
+pub(crate) const LEAST: usize = 100;
+
+/// The files of a folder without folders in it, by their names.
+pub(crate) type Files = OnceLock<BTreeMap<String, Vec<u8>>>;
 
 pub(crate) fn lexisplat() -> Command {
     Command::cargo_bin("lexisplat").unwrap()
@@ -29,21 +35,44 @@ impl Folder {
     /// A folder with a scene of [`FEW`] Gaussians, and `cameras.json`: a few small views of it. A scene is packed by them much
     /// sooner than by views that are looked for.
     pub(crate) fn few() -> Self {
-        let folder = Self::of(FEW);
-        folder.add_cameras(12);
+        Self::with_cameras(FEW)
+    }
+
+    /// The same with [`LEAST`] Gaussians.
+    pub(crate) fn least() -> Self {
+        Self::with_cameras(LEAST)
+    }
+
+    fn with_cameras(gaussians: usize) -> Self {
+        let folder = Self::of(gaussians);
+        let splats = read(&folder.path("scene.ply"));
+        std::fs::write(folder.path("cameras.json"), cameras(&splats, 12)).unwrap();
         folder
     }
 
-    fn of(gaussians: usize) -> Self {
+    /// A folder with the scene of [`Self::new`], and `scene.lexi`: it packed with `--guess`.
+    pub(crate) fn guessed() -> Self {
+        static FILES: Files = Files::new();
+        Self::with(&FILES, || {
+            let folder = Self::new();
+            folder.run(&["compress", "scene.ply", "--guess", "--quiet"]);
+            folder
+        })
+    }
+
+    /// A folder with the files of the one that `make` returns. It is made once for all tests.
+    pub(crate) fn with(files: &Files, make: impl FnOnce() -> Self) -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        for (name, bytes) in files.get_or_init(|| make().files()) {
+            std::fs::write(folder.path(name), bytes).unwrap();
+        }
+        folder
+    }
+
+    pub(crate) fn of(gaussians: usize) -> Self {
         let folder = Self(tempfile::tempdir().unwrap());
         ply::write(&folder.path("scene.ply"), &scene(&SampleOptions::new(gaussians, 0))).unwrap();
         folder
-    }
-
-    /// Adds `cameras.json`, `views` views around the scene.
-    pub(crate) fn add_cameras(&self, views: usize) {
-        let splats = read(&self.path("scene.ply"));
-        std::fs::write(self.path("cameras.json"), cameras(&splats, views)).unwrap();
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use lexisplat::{ShDegree, ply};
 use lexisplat_sample::{SampleOptions, scene};
 
-use crate::folder::Folder;
+use crate::folder::{FEW, Files, Folder, LEAST};
 
 /// The output of coding or decoding the scene.
 pub(crate) const OUTPUT: &str = "made";
@@ -71,12 +71,25 @@ const CAMERAS: &str = r#"[
  "position": [0.5, 0, -3], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
 ]"#;
 
-/// A folder with all that the jobs read.
+/// A folder with all that the jobs read: a scene of [`LEAST`] Gaussians.
 pub(crate) fn ready() -> Folder {
-    let folder = Folder::new();
-    std::fs::write(folder.path("cameras.json"), CAMERAS).unwrap();
-    folder.run(&["compress", "scene.ply", "--guess", "-o", "kept.lexi", "--quiet"]);
-    folder
+    static FILES: Files = Files::new();
+    ready_of(LEAST, &FILES)
+}
+
+/// The same with [`FEW`] Gaussians, of which every job makes more than 4096 bytes.
+pub(crate) fn ready_of_few() -> Folder {
+    static FILES: Files = Files::new();
+    ready_of(FEW, &FILES)
+}
+
+fn ready_of(gaussians: usize, files: &Files) -> Folder {
+    Folder::with(files, || {
+        let folder = Folder::of(gaussians);
+        std::fs::write(folder.path("cameras.json"), CAMERAS).unwrap();
+        folder.run(&["compress", "scene.ply", "--guess", "-o", "kept.lexi", "--quiet"]);
+        folder
+    })
 }
 
 /// Returns the output of a job that nobody disturbs, and its time.

@@ -12,7 +12,7 @@ use super::runs::{
     JOBS, OLD, OUTPUT, PATIENCE, PROGRAM, assert_old_or_new, code, program, ready, said, send, undisturbed,
     wait_until_watching,
 };
-use crate::folder::Folder;
+use crate::folder::{Folder, LEAST};
 
 /// Signals with their numbers and exit codes.
 const SIGNALS: [(&str, i32, i32); 3] = [("HUP", 1, 129), ("INT", 2, 130), ("TERM", 15, 143)];
@@ -90,7 +90,7 @@ fn what_is_said_fits_what_was_written() {
 
 #[test]
 fn a_hang_up_that_nohup_ignores_stays_ignored() {
-    let folder = Folder::new();
+    let folder = Folder::of(LEAST);
     let mut child = Command::new("sh")
         .args([
             "-c",

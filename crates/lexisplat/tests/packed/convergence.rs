@@ -59,7 +59,7 @@ fn small_steps_converge() {
 
 #[test]
 fn finer_steps_mean_smaller_errors_and_larger_files() {
-    let splats = sample(3000, 22, 3);
+    let splats = sample(1000, 22, 3);
     let mut last: Option<[f64; 6]> = None;
     for step in [1e-3, 1e-4, 1e-5] {
         let options = options(|o| o.keep_order = true);

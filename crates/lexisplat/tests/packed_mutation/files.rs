@@ -51,11 +51,11 @@ pub(crate) fn layered() -> Vec<u8> {
     packed(&splats, 1e-4, |o| o.atoms = Some(8), None)
 }
 
-/// One Gaussian again and again, with a row that is stored exactly.
+/// One Gaussian again and again, with a row that is stored exactly. The pursuit of its code over few atoms is short.
 pub(crate) fn rows(count: usize) -> Vec<u8> {
     let degree = ShDegree::new(4).unwrap();
     let splats = Splats { degree, sh_rest: vec![1e6; count * degree.rest()], ..common::copies(count) };
-    packed(&splats, 1e300, |_| (), None)
+    packed(&splats, 1e300, |o| o.atoms = Some(8), None)
 }
 
 /// One Gaussian again and again.

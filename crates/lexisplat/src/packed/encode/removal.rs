@@ -100,15 +100,18 @@ mod tests {
     use crate::support::testing::scene;
     use crate::{Silent, Splats};
 
+    /// Gaussians of the scene.
+    const NUMBER: u32 = 100;
+
     /// A scene whose Gaussians have their number as an extra property, and a measured sensitivity. Every fifth Gaussian
     /// shows in no picture.
     fn measured() -> (Splats, Sensitivity) {
-        let mut splats = scene(600, 2);
-        let numbers = ExtraValues::U32((0..600).collect());
+        let mut splats = scene(NUMBER as usize, 2);
+        let numbers = ExtraValues::U32((0..NUMBER).collect());
         splats.geometry.extras = vec![Extra { name: "number".into(), values: numbers }];
         let mut sensitivity = Sensitivity::guess(&splats.geometry);
         sensitivity.removal.fill(0.01);
-        for i in (0..600).step_by(5) {
+        for i in (0..NUMBER as usize).step_by(5) {
             sensitivity.opacity[i] = 1e-20;
         }
         (splats, sensitivity)
@@ -120,7 +123,10 @@ mod tests {
         let (packed, _) = packer.pack(1e-7, &Silent).unwrap();
         let geometry = packed.unpack().unwrap().into_splats().geometry;
         let ExtraValues::U32(numbers) = &geometry.extras[0].values else { panic!("not u32") };
-        assert_eq!((packed.len(), packed.head().removed), (numbers.len(), 600 - numbers.len() as u64));
+        assert_eq!(
+            (packed.len(), packed.head().removed),
+            (numbers.len(), u64::from(NUMBER) - numbers.len() as u64)
+        );
         let mut numbers = numbers.clone();
         numbers.sort_unstable();
         numbers
@@ -130,7 +136,7 @@ mod tests {
     fn what_shows_less_than_its_bits_are_worth_goes() {
         let (mut splats, mut sensitivity) = measured();
         let options = PackOptions::default();
-        let rest = |step: u32| (0..600).filter(|k| k % step != 0).collect::<Vec<u32>>();
+        let rest = |step: u32| (0..NUMBER).filter(|k| k % step != 0).collect::<Vec<u32>>();
         assert_eq!(numbers(&splats, &sensitivity, &options), rest(5));
         // A Gaussian that one picture shows much more than others do stays.
         for (most, mean) in sensitivity.removal_view.iter_mut().zip(&sensitivity.opacity) {
@@ -140,18 +146,18 @@ mod tests {
         assert!(
             numbers(&splats, &sensitivity, &options)
                 .into_iter()
-                .eq((0..600).filter(|k| k % 5 != 0 || *k == 5))
+                .eq((0..NUMBER).filter(|k| k % 5 != 0 || *k == 5))
         );
         sensitivity.removal_view.fill(0.0);
         // A Gaussian that no view showed stays, unless its opacity is so small that no view can show it.
-        for i in (0..600).step_by(10) {
+        for i in (0..NUMBER as usize).step_by(10) {
             sensitivity.removal[i] = 0.0;
         }
-        assert!(numbers(&splats, &sensitivity, &options).into_iter().eq((0..600).filter(|k| k % 10 != 5)));
+        assert!(numbers(&splats, &sensitivity, &options).into_iter().eq((0..NUMBER).filter(|k| k % 10 != 5)));
         splats.geometry.opacities.iter_mut().step_by(10).for_each(|opacity| *opacity = -5.6);
         assert_eq!(numbers(&splats, &sensitivity, &options), rest(5));
         splats.geometry.opacities.iter_mut().step_by(10).for_each(|opacity| *opacity = -5.5);
-        assert!(numbers(&splats, &sensitivity, &options).into_iter().eq((0..600).filter(|k| k % 10 != 5)));
+        assert!(numbers(&splats, &sensitivity, &options).into_iter().eq((0..NUMBER).filter(|k| k % 10 != 5)));
     }
 
     #[test]
@@ -162,10 +168,10 @@ mod tests {
             PackOptions::default().with_keep_order(true),
             PackOptions::default().with_tolerance(0.1),
         ] {
-            assert_eq!(numbers(&splats, &sensitivity, &options).len(), 600, "{options:?}");
+            assert_eq!(numbers(&splats, &sensitivity, &options).len(), NUMBER as usize, "{options:?}");
         }
         sensitivity.removal.fill(f32::INFINITY);
-        assert_eq!(numbers(&splats, &sensitivity, &PackOptions::default()).len(), 600);
+        assert_eq!(numbers(&splats, &sensitivity, &PackOptions::default()).len(), NUMBER as usize);
     }
 
     #[test]
