@@ -84,11 +84,7 @@ impl Refine {
             }
         };
         let share = |share: f64| (share * all).clamp(1.0, MOST).round() as usize;
-        RefineSteps {
-            all: share(1.0),
-            radiance: share(std::env::var("RADIANCE").map_or(RADIANCE, |v| v.parse().unwrap())),
-            appearance: share(std::env::var("APPEARANCE").map_or(APPEARANCE, |v| v.parse().unwrap())),
-        }
+        RefineSteps { all: share(1.0), radiance: share(RADIANCE), appearance: share(APPEARANCE) }
     }
 }
 

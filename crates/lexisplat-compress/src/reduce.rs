@@ -14,7 +14,7 @@ use crate::target::Target;
 
 /// Amount by which the quality of the Gaussians that stay may fall short of the quality asked for before they are refined,
 /// in dB. Refining gains about 5 dB, which quantisation uses up (docs/METHOD.md, "Refining").
-const BELOW: f64 = 0.0;
+const BELOW: f64 = 1.0;
 /// Bytes of a Gaussian in a refined file, from which a size gives the number of Gaussians.
 const BYTES_EACH: f64 = 10.5;
 /// Quality at which short rows of SH-rest pay if the target is a size, in dB.
@@ -59,12 +59,7 @@ impl Packing {
                     let score = judge.score(splats, progress)?;
                     Ok(if least { score.least } else { score.judged })
                 };
-                let made = removal.down_to(
-                    decibels - BELOW + std::env::var("DELTA").map_or(0.0, |v| v.parse().unwrap()),
-                    splats,
-                    sensitivity,
-                    &mut value,
-                )?;
+                let made = removal.down_to(decibels - BELOW, splats, sensitivity, &mut value)?;
                 (made.0, made.1, decibels)
             }
         };
@@ -76,12 +71,7 @@ impl Packing {
         let after = judge.score(&splats, progress)?.judged;
         let report =
             RefineReport { steps: all, gaussians: splats.len(), before_psnr: before, after_psnr: after };
-        let mut sensitivity = removal.views.sensitivity(removal.renderer, &splats, progress)?;
-        let trial =
-            |name: &str, d: f32| std::env::var(name).ok().and_then(|v| v.parse::<f32>().ok()).unwrap_or(d);
-        sensitivity.position.as_flattened_mut().iter_mut().for_each(|s| *s *= trial("GEOP", 1.0));
-        sensitivity.scale.as_flattened_mut().iter_mut().for_each(|s| *s *= trial("GEOS", 1.0));
-        sensitivity.rotation.as_flattened_mut().iter_mut().for_each(|s| *s *= trial("GEOR", 1.0));
+        let sensitivity = removal.views.sensitivity(removal.renderer, &splats, progress)?;
         Ok((splats, sensitivity, report))
     }
 }
