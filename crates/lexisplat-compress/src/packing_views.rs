@@ -2,7 +2,7 @@
 
 use lexisplat::packed::curve_order;
 use lexisplat::{Geometry, Progress, Sensitivity, Splats};
-use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
+use lexisplat_render::{Camera, Renderer, Scene, Split, aside, between, interior_views, object, surround};
 
 use crate::error::{Error, Result};
 use crate::found::{Found, GENERATED_SIZE, ViewCounts, evenly, find};
@@ -58,8 +58,13 @@ const MAX_VIEWS: usize = 150;
 /// Every `JUDGE_SHARE`-th given camera judges. All given cameras measure, so the judging views score up to 0.1 dB better
 /// than views that did not measure (docs/METHOD.md).
 const JUDGE_SHARE: usize = 2;
-/// Every `REFINED_JUDGE_SHARE`-th of the given cameras that judge also judges a refined file. The others are fitted to.
+/// Every `REFINED_JUDGE_SHARE`-th of the given cameras that judge also judges a refined file, or more of them if these are
+/// fewer than `REFINED_JUDGES`. The others are fitted to.
 const REFINED_JUDGE_SHARE: usize = 3;
+const REFINED_JUDGES: usize = 12;
+/// Views between given cameras to which everything is fitted: the neighbour of each camera, from the nearest, and the share
+/// of the way to it. Without them the fit suits the cameras, and views between these are up to 6 dB worse (docs/METHOD.md).
+const REFINED_BETWEEN: [(usize, f64); 2] = [(0, 0.4), (2, 0.5)];
 /// Number of views beside given cameras that measure too. Without them Gaussians that only such views show have coarse
 /// steps (docs/METHOD.md).
 const ASIDE: usize = 20;
@@ -321,16 +326,23 @@ impl PackingViews {
     /// to and stay.
     pub(crate) fn for_refining(mut self) -> Self {
         if self.given {
-            self.judging = self.judging.into_iter().step_by(REFINED_JUDGE_SHARE).collect();
+            let stride = (self.judging.len() / REFINED_JUDGES).clamp(1, REFINED_JUDGE_SHARE);
+            self.judging = self.judging.into_iter().step_by(stride).collect();
         }
         self
     }
 
-    /// Returns the views to which everything is fitted: those that measure and do not judge. Of sharp pictures only some squares are
-    /// drawn.
+    /// Returns the views to which everything is fitted: those that measure and do not judge, and views between given
+    /// cameras. Of sharp pictures only some squares are drawn.
     pub(crate) fn refining(&self) -> Vec<Camera> {
         let free = self.measuring.iter().filter(|camera| !self.judging.contains(camera));
-        sampled(free.cloned().collect(), REFINED_PIXELS)
+        let mut views: Vec<Camera> = free.cloned().collect();
+        if self.given {
+            for (rank, share) in REFINED_BETWEEN {
+                views.extend(between(&self.measuring, rank, share));
+            }
+        }
+        sampled(views, REFINED_PIXELS)
     }
 
     fn fitting_to(&self, splats: &Splats, pixels: u64) -> Vec<Camera> {

@@ -43,6 +43,7 @@
 extern crate self as lexisplat_render;
 
 mod aside;
+mod between;
 mod bulk;
 mod camera;
 mod cameras_json;
@@ -80,6 +81,7 @@ mod view_set;
 mod wait;
 
 pub use aside::aside;
+pub use between::between;
 pub use bulk::bulk;
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, read_cameras_bytes};
