@@ -4,17 +4,20 @@ use lexisplat::packed::Packer;
 use lexisplat::{Sensitivity, Splats};
 
 use crate::effort::RefineSteps;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::fewer::Removal;
-use crate::judge::Judge;
+use crate::judge::{Judge, Score};
 use crate::packing::{Packing, Quality};
 use crate::refine::{Free, Refining, RestCost};
 use crate::report::RefineReport;
 use crate::target::Target;
 
-/// Amount by which the quality of the Gaussians that stay may fall short of the quality asked for before they are refined,
-/// in dB. Refining gains about 5 dB, which quantisation uses up (docs/METHOD.md, "Refining").
-const BELOW: f64 = 1.0;
+/// Amounts by which the quality of the Gaussians that stay may fall short of the quality asked for before they are refined,
+/// in dB. After a fit that gains too little more Gaussians stay, by the next amount.
+const BELOW: [f64; 3] = [1.0, -2.5, -6.0];
+/// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
+/// it needs so fine steps that the file becomes larger (docs/METHOD.md, "Refining").
+const ABOVE: f64 = 3.5;
 /// Bytes of a Gaussian in a refined file, from which a size gives the number of Gaussians.
 const BYTES_EACH: f64 = 10.5;
 /// Quality at which short rows of SH-rest pay if the target is a size, in dB.
@@ -37,7 +40,7 @@ impl Packing {
         source_bytes: u64,
     ) -> Result<(Splats, Sensitivity, RefineReport)> {
         let progress = removal.progress;
-        let (mut splats, sensitivity, decibels) = match self.quality {
+        let (decibels, least) = match self.quality {
             Quality::Target(target @ (Target::Size(_) | Target::Ratio(_))) => {
                 let bytes = target.bytes(source_bytes);
                 #[expect(
@@ -47,22 +50,40 @@ impl Packing {
                 )]
                 let most = (bytes / BYTES_EACH).ceil() as usize;
                 let made = removal.at_most(most.max(1), splats, sensitivity)?;
-                (made.0, made.1, SIZE_DB)
+                return self.fitted(made, removal, refining, judge, SIZE_DB);
             }
-            quality => {
-                let (decibels, least) = match quality {
-                    Quality::Target(Target::MinPsnr(decibels)) => (decibels, true),
-                    Quality::Target(target) => (target.asked(), false),
-                    Quality::Preset(preset) => (preset.decibels(), false),
-                };
-                let mut value = |splats: &Splats| {
-                    let score = judge.score(splats, progress)?;
-                    Ok(if least { score.least } else { score.judged })
-                };
-                let made = removal.down_to(decibels - BELOW, splats, sensitivity, &mut value)?;
-                (made.0, made.1, decibels)
-            }
+            Quality::Target(Target::MinPsnr(decibels)) => (decibels, true),
+            Quality::Target(target) => (target.asked(), false),
+            Quality::Preset(preset) => (preset.decibels(), false),
         };
+        let value = |score: Score| Ok::<_, Error>(if least { score.least } else { score.judged });
+        let mut tries = BELOW.into_iter();
+        loop {
+            let below = tries.next();
+            let made = match below {
+                Some(below) => {
+                    let quality = &mut |splats: &Splats| value(judge.score(splats, progress)?);
+                    removal.down_to(decibels - below, splats, sensitivity.clone(), quality)?
+                }
+                None => (splats.clone(), sensitivity.clone()),
+            };
+            let fitted = self.fitted(made, removal, refining, judge, decibels)?;
+            if below.is_none() || value(judge.score(&fitted.0, progress)?)? >= decibels + ABOVE {
+                return Ok(fitted);
+            }
+        }
+    }
+
+    /// Fits a scene to `refining`, and measures its sensitivity again. `decibels` is the quality asked for.
+    fn fitted(
+        &self,
+        (mut splats, sensitivity): (Splats, Sensitivity),
+        removal: &mut Removal<'_>,
+        refining: &Refining,
+        judge: &mut Judge,
+        decibels: f64,
+    ) -> Result<(Splats, Sensitivity, RefineReport)> {
+        let progress = removal.progress;
         let RefineSteps { all, .. } = refining.steps;
         let before = judge.score(&splats, progress)?.judged;
         let step = Packer::new(&splats, &sensitivity, &self.options)?.step_for(decibels);

@@ -191,7 +191,8 @@ impl Packing {
                 (fewer, sensitivity) = (Some(made.0), made.1);
             }
             if let Some(effort) = self.refine {
-                let to = Refining::to(&splats, views.refining(), effort, progress)?;
+                let to = views.refining(removal.renderer, &splats, progress)?;
+                let to = Refining::to(&splats, to, effort, progress)?;
                 let judges = views.some_judging(PRESET_JUDGES);
                 let mut judge = Judge::new(self.renderer()?, &splats, &judges, given, progress)?;
                 let start = fewer.as_ref().unwrap_or(&splats);
