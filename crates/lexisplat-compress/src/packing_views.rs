@@ -325,39 +325,35 @@ impl PackingViews {
         self.fitting_to(part, FITTED_PIXELS.of(part) / PART_FITTED_SHARE)
     }
 
-    /// Returns these views with fewer judges, so that more views are left to fit to. Found views that judge are never fitted
-    /// to and stay.
-    pub(crate) fn for_refining(mut self) -> Self {
-        if self.given {
-            let stride = (self.judging.len() / REFINED_JUDGES).clamp(1, REFINED_JUDGE_SHARE);
-            self.judging = self.judging.into_iter().step_by(stride).collect();
-        }
-        self
-    }
-
-    /// Returns the views to which everything is fitted: those that measure and do not judge. If cameras were given, views
-    /// between and beside them and found views are added, so that other views than the given ones stay good too. Of sharp
-    /// pictures only some squares are drawn.
+    /// Returns the views for refining, and those to which everything is fitted. Of sharp pictures the latter draw only some
+    /// squares.
+    ///
+    /// If cameras were given, fewer of them judge, so that more are left to fit to, and found views measure too. Everything
+    /// is fitted to the views that measure and do not judge, and to views between and beside the cameras, so that other
+    /// views than the given ones stay good. Found views that judge are never fitted to.
     ///
     /// # Errors
     /// As [`Self::found`].
-    pub(crate) fn refining(
-        &self,
+    pub(crate) fn for_refining(
+        mut self,
         renderer: &mut Renderer,
         splats: &Splats,
         progress: &dyn Progress,
-    ) -> Result<Vec<Camera>> {
-        let free = self.measuring.iter().filter(|camera| !self.judging.contains(camera));
-        let mut views: Vec<Camera> = free.cloned().collect();
+    ) -> Result<(Self, Vec<Camera>)> {
+        let mut fitted = Vec::new();
         if self.given {
+            let stride = (self.judging.len() / REFINED_JUDGES).clamp(1, REFINED_JUDGE_SHARE);
+            self.judging = self.judging.into_iter().step_by(stride).collect();
             for (rank, share) in REFINED_BETWEEN {
-                views.extend(between(&self.measuring, rank, share));
+                fitted.extend(between(&self.measuring, rank, share));
             }
-            views.extend(aside(&splats.geometry, &self.measuring, ASIDE));
+            fitted.extend(aside(&splats.geometry, &self.measuring, ASIDE));
             let found = Self::found(renderer, splats, progress)?.measuring;
-            views.extend(found.iter().step_by(found.len().div_ceil(REFINED_FOUND).max(1)).cloned());
+            let stride = found.len().div_ceil(REFINED_FOUND).max(1);
+            self.measuring.extend(found.into_iter().step_by(stride));
         }
-        Ok(sampled(views, REFINED_PIXELS))
+        fitted.extend(self.measuring.iter().filter(|camera| !self.judging.contains(camera)).cloned());
+        Ok((self, sampled(fitted, REFINED_PIXELS)))
     }
 
     fn fitting_to(&self, splats: &Splats, pixels: u64) -> Vec<Camera> {

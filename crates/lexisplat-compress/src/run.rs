@@ -175,12 +175,22 @@ impl Packing {
 
         let clock = Stopwatch::start();
         let given = views.are_given();
-        let views = if self.refine.is_some() { views.for_refining() } else { views };
+        let hidden = given.then(|| near_plane_hides(&splats.geometry, views.measuring())).flatten();
+        let (views, sensitivity, fitted) = match self.refine {
+            Some(_) => {
+                let (views, fitted) = views.for_refining(&mut renderer, &splats, progress)?;
+                let sensitivity = match given {
+                    true => views.sensitivity(&mut renderer, &splats, progress)?,
+                    false => sensitivity,
+                };
+                (views, sensitivity, fitted)
+            }
+            None => (views, sensitivity, Vec::new()),
+        };
         let fit = match self.options.may_change() {
             true => Some(Fit::to(&splats, views.fitting(&splats), given, progress)?),
             false => None,
         };
-        let hidden = given.then(|| near_plane_hides(&splats.geometry, views.measuring())).flatten();
         let most = self.max_gaussians.filter(|&most| most < splats.len());
         let (mut fewer, mut sensitivity) = (None, sensitivity);
         let (mut refining, mut refined) = (None, None);
@@ -191,8 +201,7 @@ impl Packing {
                 (fewer, sensitivity) = (Some(made.0), made.1);
             }
             if let Some(effort) = self.refine {
-                let to = views.refining(removal.renderer, &splats, progress)?;
-                let to = Refining::to(&splats, to, effort, progress)?;
+                let to = Refining::to(&splats, fitted, effort, progress)?;
                 let judges = views.some_judging(PRESET_JUDGES);
                 let mut judge = Judge::new(self.renderer()?, &splats, &judges, given, progress)?;
                 let start = fewer.as_ref().unwrap_or(&splats);
