@@ -67,7 +67,7 @@ const REFINED_JUDGES: usize = 12;
 const REFINED_BETWEEN: [(usize, f64); 2] = [(0, 0.4), (2, 0.5)];
 /// Most found views to which everything is fitted beside given cameras. Without them and views beside the cameras room takes
 /// a fifth fewer bytes, and views off the path of the cameras lose 6 dB (docs/METHOD.md).
-const REFINED_FOUND: usize = 80;
+const REFINED_FOUND: usize = 32;
 /// Number of views beside given cameras that measure too. Without them Gaussians that only such views show have coarse
 /// steps (docs/METHOD.md).
 const ASIDE: usize = 20;
