@@ -14,7 +14,7 @@ use lexisplat_sample::{SampleOptions, scene};
 const VARIABLE: &str = "LEXISPLAT_SIMD";
 /// Numbers of threads, one for each run of all commands.
 const THREADS: [&str; 3] = ["1", "2", "7"];
-/// Gaussians of the larger scene: three units of work of the exact layouts, so that threads share them.
+/// Gaussians of the larger scene: three units of work, so that threads share them.
 const MANY: usize = 5000;
 /// Gaussians of a scene that is packed in parts: more than of the largest that is packed as a whole.
 const LARGE: usize = 270_000;
@@ -30,7 +30,7 @@ const COMMANDS: [&str; 13] = [
     "compress few.ply -o aimed.lexi --psnr 30 --cameras cameras.json",
     "compress few.ply -o sized.lexi --size 9kB --keep-all --cameras cameras.json",
     "compress few.ply -o promised.lexi --layout packed --tol 0.1 --cameras cameras.json",
-    "compress few.ply -o little.lexi --preset balanced --memory 100kB",
+    "compress many.ply -o little.lexi --preset balanced --memory 1MB",
     "compress large.ply -o parts.lexi --guess",
     "decompress f16.lexi -o f16.ply",
     "decompress preset.lexi -o preset.ply",
@@ -38,7 +38,7 @@ const COMMANDS: [&str; 13] = [
     "render preset.lexi -o sparse --orbit 2 --width 96 --device cpu",
 ];
 
-/// A folder with what the commands read.
+/// A folder with the scenes and the cameras that the commands read.
 fn given() -> Folder {
     let folder = Folder(tempfile::tempdir().unwrap());
     ply::write(&folder.path("many.ply"), &scene(&SampleOptions::new(MANY, 1))).unwrap();
