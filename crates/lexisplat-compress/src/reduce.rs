@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::fewer::Removal;
 use crate::judge::{Judge, Score};
 use crate::packing::{Packing, Quality};
-use crate::refine::{Free, Refining, RestCost};
+use crate::refine::{Free, Part, Refining, RestCost};
 use crate::report::RefineReport;
 use crate::target::Target;
 
@@ -88,7 +88,7 @@ impl Packing {
         let before = judge.score(&splats, progress)?.judged;
         let step = Packer::new(&splats, &sensitivity, &self.options)?.step_for(decibels);
         let cost = RestCost::new(sensitivity.colour.iter().copied(), step);
-        refining.refine(&mut splats, Free::All, all, &cost, progress)?;
+        refining.refine(&mut splats, Free::All, Part::whole(all), &cost, progress)?;
         let after = judge.score(&splats, progress)?.judged;
         let report =
             RefineReport { steps: all, gaussians: splats.len(), before_psnr: before, after_psnr: after };

@@ -48,6 +48,19 @@ pub(crate) enum Free {
     Appearance,
 }
 
+/// Steps of a fit: those of number `from` to below `of`, of `of` steps in all. Later steps are smaller.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Part {
+    pub(crate) from: usize,
+    pub(crate) of: usize,
+}
+
+impl Part {
+    pub(crate) fn whole(steps: usize) -> Self {
+        Self { from: 0, of: steps }
+    }
+}
+
 /// The cost of SH-rest in bits, which makes short rows pay.
 pub(crate) struct RestCost {
     /// Root of the sensitivity of pictures to the colour of each Gaussian, over the overall step.
@@ -102,7 +115,7 @@ impl Refining {
         Ok(Self { cameras, targets, steps })
     }
 
-    /// Fits the `free` values of `splats` in `steps` steps. Short rows of SH-rest pay by `cost`.
+    /// Fits the `free` values of `splats` in a `part` of a fit. Short rows of SH-rest pay by `cost`.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -110,7 +123,7 @@ impl Refining {
         &self,
         splats: &mut Splats,
         free: Free,
-        steps: usize,
+        Part { from, of }: Part,
         cost: &RestCost,
         progress: &dyn Progress,
     ) -> Result<()> {
@@ -120,12 +133,12 @@ impl Refining {
         let mut differentiator = Differentiator::default();
         let mut adam = Adam::new(splats);
         let sizes = Sizes::new(free, extent(&self.cameras));
-        progress.begin(Stage::Refine, steps as u64);
-        for step in 0..steps {
+        progress.begin(Stage::Refine, of.saturating_sub(from) as u64);
+        for step in from..of {
             progress.check()?;
             let view = order(step, self.cameras.len());
             let gradient = differentiator.gradient(splats, &self.cameras[view], &self.targets[view])?;
-            adam.step(splats, &gradient, &sizes.after(step, steps), cost);
+            adam.step(splats, &gradient, &sizes.after(step, of), cost);
             progress.advance(1);
         }
         progress.end();
@@ -340,7 +353,7 @@ mod tests {
         // A cost makes rows of SH-rest shorter.
         let length = |splats: &Splats| splats.sh_rest.iter().map(|v| f64::from(v * v)).sum::<f64>();
         let cost = RestCost::new(std::iter::repeat_n(1e-4, 200), 1e-3);
-        refining.refine(&mut fitted[2].1, Free::Radiance, 160, &cost, &Silent).unwrap();
+        refining.refine(&mut fitted[2].1, Free::Radiance, Part::whole(160), &cost, &Silent).unwrap();
         assert!(length(&fitted[2].1) < 0.9 * length(&fitted[1].1));
     }
 
@@ -351,7 +364,7 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let mut splats = some.clone();
             let cost = RestCost::new(std::iter::repeat_n(1e-6, 200), 1e-3);
-            pool.install(|| refining.refine(&mut splats, Free::All, 20, &cost, &Silent)).unwrap();
+            pool.install(|| refining.refine(&mut splats, Free::All, Part::whole(20), &cost, &Silent)).unwrap();
             splats
         };
         assert_eq!(fitted(1), fitted(3));

@@ -210,13 +210,20 @@ pub(crate) fn pack_to_preset(
         let (packed, report) = packer.complete(&quantised, refitted, progress)?;
         return Ok((packed, report, score));
     };
-    drop((quantised, refitted));
+    let kept = match packer.refines() {
+        true => Some(packer.complete(&quantised, refitted, progress)?),
+        false => None,
+    };
+    drop(quantised);
     let (packed, report) = packer.pack(libm::exp2(on_grid(next, STEPS_PER_OCTAVE)), true, progress)?;
     let last = judge.score(&packed.unpack()?, progress)?;
     if (last.judged - aim).abs() < off {
         return Ok((packed, report, last));
     }
-    let (packed, report) = packer.pack(libm::exp2(log_step), true, progress)?;
+    let (packed, report) = match kept {
+        Some(kept) => kept,
+        None => packer.pack(libm::exp2(log_step), true, progress)?,
+    };
     Ok((packed, report, score))
 }
 
@@ -339,7 +346,7 @@ impl Search {
                 if self.is_size { log_step < best.log_step } else { file_bytes < best.file_bytes }
             };
             if met && best.as_ref().is_none_or(is_better) {
-                let complete = self.is_size || is_close;
+                let complete = self.is_size || is_close || packer.refines();
                 let (packed, report) = match complete {
                     true => packer.complete(&quantised, refitted, progress)?,
                     false => refitted.file,
