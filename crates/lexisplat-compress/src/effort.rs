@@ -7,11 +7,10 @@ use crate::error::{Error, Result};
 /// Name of the choice in errors.
 pub(crate) const REFINE: &str = "refine";
 /// Steps of the fit of all values with [`Refine::Quick`] and [`Refine::Thorough`].
-const QUICK: usize = 400;
+const QUICK: usize = 800;
 const THOROUGH: usize = 2000;
-/// Steps of the other fits, as shares of the steps of the first.
+/// Steps of the other two fits, as shares of the steps of the first.
 const RADIANCE: f64 = 0.6;
-const AGAIN: f64 = 0.2;
 const APPEARANCE: f64 = 0.2;
 /// Time of a step in seconds on one thread of a server processor of 2024 (docs/results/refine.md): for each pixel of its
 /// view, and for each Gaussian of the scene.
@@ -27,7 +26,7 @@ const MOST: f64 = 1e7;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Refine {
-    /// About a sixth of the steps of [`Self::Thorough`].
+    /// Two fifths of the steps of [`Self::Thorough`].
     Quick,
     /// The steps after which more gain little.
     Thorough,
@@ -58,8 +57,6 @@ pub(crate) struct RefineSteps {
     pub(crate) all: usize,
     /// Of the fit of SH-rest, base colours and opacities to quantised positions and shapes.
     pub(crate) radiance: usize,
-    /// Of the same fit when it begins where that for another file ended.
-    pub(crate) again: usize,
     /// Of the fit of base colours and opacities to quantised SH-rest.
     pub(crate) appearance: usize,
 }
@@ -83,11 +80,11 @@ impl Refine {
             Self::Thorough => THOROUGH as f64,
             Self::Minutes(minutes) => {
                 let step = SECONDS_PER_PIXEL * pixels + SECONDS_PER_GAUSSIAN * gaussians as f64;
-                60.0 * minutes / (step * (1.0 + RADIANCE + APPEARANCE + (FILES - 1.0) * (AGAIN + APPEARANCE)))
+                60.0 * minutes / (step * (1.0 + FILES * (RADIANCE + APPEARANCE)))
             }
         };
         let share = |share: f64| (share * all).clamp(1.0, MOST).round() as usize;
-        RefineSteps { all: share(1.0), radiance: share(RADIANCE), again: share(AGAIN), appearance: share(APPEARANCE) }
+        RefineSteps { all: share(1.0), radiance: share(RADIANCE), appearance: share(APPEARANCE) }
     }
 }
 
@@ -112,7 +109,7 @@ mod tests {
         let (one, two) = (of(1.0), of(2.0));
         assert!(one.all > 100 && one.radiance < one.all && one.appearance < one.radiance, "{one:?}");
         assert!(two.all.abs_diff(2 * one.all) <= 1, "{one:?} {two:?}");
-        assert_eq!(of(1e-12), RefineSteps { all: 1, radiance: 1, again: 1, appearance: 1 });
+        assert_eq!(of(1e-12), RefineSteps { all: 1, radiance: 1, appearance: 1 });
         assert_eq!(of(1e300).all, 10_000_000);
     }
 }

@@ -62,7 +62,6 @@ mod refit;
 mod report;
 mod run;
 mod sharp_views;
-mod settling;
 mod signs;
 mod size_spread;
 mod solve;

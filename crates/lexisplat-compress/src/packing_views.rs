@@ -6,7 +6,7 @@ use lexisplat_render::{Camera, Renderer, Scene, Split, aside, between, interior_
 
 use crate::error::{Error, Result};
 use crate::found::{Found, GENERATED_SIZE, ViewCounts, evenly, find};
-use crate::sharp_views::sampled;
+use crate::sharp_views::{sampled, sampled_again};
 use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints};
 
 /// Number of generated views that measure: [`GAUSSIANS_DRAWN`] over the number of Gaussians, within this range. Views of
@@ -46,8 +46,10 @@ const FITTED_PIXELS: Pixels = Pixels { always: 12_000_000, each: 6, most: 24_000
 /// Divisor of [`FITTED_PIXELS`] for a part of a scene. With half this divisor three copies of room-large have 0.14 dB more,
 /// in 1.2 times the time.
 const PART_FITTED_SHARE: u64 = 4;
-/// Number of pixels to which everything is fitted.
+/// Number of pixels that are fitted to in a round of all views, and number of pixels in all. Rounds draw other squares than the
+/// round before. With the same squares in each round, files of room-large were 8 % larger (docs/METHOD.md, "Refining").
 const REFINED_PIXELS: u64 = 24_000_000;
+const MOST_REFINED_PIXELS: u64 = 96_000_000;
 /// Every `MEASURED_HALVED`-th view that measures is also drawn at half its size. Every `FITTED_HALVED`-th view for fitting
 /// is at half its size instead. Otherwise errors that are even over many pixels count for too little, and show when
 /// pictures are drawn smaller (docs/METHOD.md, "How sharp").
@@ -67,7 +69,7 @@ const REFINED_JUDGES: usize = 12;
 const REFINED_BETWEEN: [(usize, f64); 2] = [(0, 0.4), (2, 0.5)];
 /// Most found views to which everything is fitted beside given cameras. Without them and views beside the cameras room takes
 /// a fifth fewer bytes, and views off the path of the cameras lose 6 dB (docs/METHOD.md).
-const REFINED_FOUND: usize = 32;
+const REFINED_FOUND: usize = 48;
 /// Number of views beside given cameras that measure too. Without them Gaussians that only such views show have coarse
 /// steps (docs/METHOD.md).
 const ASIDE: usize = 20;
@@ -353,7 +355,7 @@ impl PackingViews {
             self.measuring.extend(found.into_iter().step_by(stride));
         }
         fitted.extend(self.measuring.iter().filter(|camera| !self.judging.contains(camera)).cloned());
-        Ok((self, sampled(fitted, REFINED_PIXELS)))
+        Ok((self, sampled_again(fitted, REFINED_PIXELS, MOST_REFINED_PIXELS)))
     }
 
     fn fitting_to(&self, splats: &Splats, pixels: u64) -> Vec<Camera> {

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::fewer::Removal;
 use crate::judge::{Judge, Score};
 use crate::packing::{Packing, Quality};
-use crate::refine::{Free, Part, Refining, RestCost};
+use crate::refine::{Free, Refining, RestCost};
 use crate::report::RefineReport;
 use crate::target::Target;
 
@@ -17,7 +17,7 @@ use crate::target::Target;
 const BELOW: [f64; 3] = [1.0, -2.5, -6.0];
 /// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
 /// it needs so fine steps that the file becomes larger (docs/METHOD.md, "Refining").
-const ABOVE: f64 = 3.5;
+const ABOVE: f64 = 3.0;
 /// Bytes of a Gaussian in a refined file, from which a size gives the number of Gaussians.
 const BYTES_EACH: f64 = 10.5;
 /// Quality at which short rows of SH-rest pay if the target is a size, in dB.
@@ -88,7 +88,7 @@ impl Packing {
         let before = judge.score(&splats, progress)?.judged;
         let step = Packer::new(&splats, &sensitivity, &self.options)?.step_for(decibels);
         let cost = RestCost::new(sensitivity.colour.iter().copied(), step);
-        refining.refine(&mut splats, Free::All, Part::whole(all), &cost, progress)?;
+        refining.refine(&mut splats, Free::All, all, &cost, progress)?;
         let after = judge.score(&splats, progress)?.judged;
         let report =
             RefineReport { steps: all, gaussians: splats.len(), before_psnr: before, after_psnr: after };

@@ -9,7 +9,7 @@ use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, Differentiator, GaussianGradient, Image, PictureGradient, Renderer, Scene};
 use rayon::prelude::*;
 
-use crate::drawing::{DrawOptions, draw_views};
+use crate::drawing::DrawOptions;
 use crate::effort::{Refine, RefineSteps};
 use crate::error::Result;
 
@@ -21,12 +21,12 @@ const SECOND: f32 = 0.99;
 const TINY: f32 = 1e-15;
 /// Sizes of the first steps: of positions as a share of the [extent](extent) of the cameras, of the logarithms of scales, of
 /// quaternions, of the logits of opacities, and of SH coefficients.
-const POSITION: f32 = 3e-5;
-const SCALES: f32 = 7.5e-3;
-const ROTATION: f32 = 1.5e-3;
-const OPACITY: f32 = 1.5e-2;
-const BASE_COLOUR: f32 = 3.75e-3;
-const REST: f32 = 3.75e-4;
+const POSITION: f32 = 1.5e-5;
+const SCALES: f32 = 1.25e-2;
+const ROTATION: f32 = 2.5e-3;
+const OPACITY: f32 = 4.5e-2;
+const BASE_COLOUR: f32 = 1.5e-2;
+const REST: f32 = 1.1e-3;
 /// Share of the first steps' size that the last steps have.
 const LAST: f32 = 0.1;
 /// Bits of the codes of a Gaussian's SH-rest each time its length doubles, about.
@@ -46,19 +46,6 @@ pub(crate) enum Free {
     Radiance,
     /// Base colours and opacities.
     Appearance,
-}
-
-/// Steps of a fit: those of number `from` to below `of`, of `of` steps in all. Later steps are smaller.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Part {
-    pub(crate) from: usize,
-    pub(crate) of: usize,
-}
-
-impl Part {
-    pub(crate) fn whole(steps: usize) -> Self {
-        Self { from: 0, of: steps }
-    }
 }
 
 /// The cost of SH-rest in bits, which makes short rows pay.
@@ -92,7 +79,8 @@ impl RestCost {
 /// The views and pictures that a scene is fitted to.
 pub(crate) struct Refining {
     cameras: Vec<Camera>,
-    targets: Vec<Image>,
+    /// The pictures of the original, of 8 bits.
+    targets: Vec<Vec<[u8; 3]>>,
     /// Numbers of steps of the fits.
     pub(crate) steps: RefineSteps,
 }
@@ -109,13 +97,21 @@ impl Refining {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
-        let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, progress)?;
-        let pixels: usize = targets.iter().map(|target| target.pixels.len()).sum();
+        let scene = cpu.prepare(Scene::from(splats))?;
+        progress.begin(Stage::Draw, cameras.len() as u64);
+        let mut targets = Vec::with_capacity(cameras.len());
+        for camera in &cameras {
+            progress.check()?;
+            targets.push(options.draw(&mut cpu, &scene, camera)?.to_8bit());
+            progress.advance(1);
+        }
+        progress.end();
+        let pixels: usize = targets.iter().map(Vec::len).sum();
         let steps = effort.steps(pixels as f64 / targets.len().max(1) as f64, splats.len());
         Ok(Self { cameras, targets, steps })
     }
 
-    /// Fits the `free` values of `splats` in a `part` of a fit. Short rows of SH-rest pay by `cost`.
+    /// Fits the `free` values of `splats` in `steps` steps. Short rows of SH-rest pay by `cost`.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -123,7 +119,7 @@ impl Refining {
         &self,
         splats: &mut Splats,
         free: Free,
-        Part { from, of }: Part,
+        steps: usize,
         cost: &RestCost,
         progress: &dyn Progress,
     ) -> Result<()> {
@@ -133,12 +129,15 @@ impl Refining {
         let mut differentiator = Differentiator::default();
         let mut adam = Adam::new(splats);
         let sizes = Sizes::new(free, extent(&self.cameras));
-        progress.begin(Stage::Refine, of.saturating_sub(from) as u64);
-        for step in from..of {
+        progress.begin(Stage::Refine, steps as u64);
+        for step in 0..steps {
             progress.check()?;
             let view = order(step, self.cameras.len());
-            let gradient = differentiator.gradient(splats, &self.cameras[view], &self.targets[view])?;
-            adam.step(splats, &gradient, &sizes.after(step, of), cost);
+            let camera = &self.cameras[view];
+            let [width, height] = camera.picture_size();
+            let target = Image::from_8bit(width, height, &self.targets[view])?;
+            let gradient = differentiator.gradient(splats, camera, &target)?;
+            adam.step(splats, &gradient, &sizes.after(step, steps), cost);
             progress.advance(1);
         }
         progress.end();
@@ -353,7 +352,7 @@ mod tests {
         // A cost makes rows of SH-rest shorter.
         let length = |splats: &Splats| splats.sh_rest.iter().map(|v| f64::from(v * v)).sum::<f64>();
         let cost = RestCost::new(std::iter::repeat_n(1e-4, 200), 1e-3);
-        refining.refine(&mut fitted[2].1, Free::Radiance, Part::whole(160), &cost, &Silent).unwrap();
+        refining.refine(&mut fitted[2].1, Free::Radiance, 160, &cost, &Silent).unwrap();
         assert!(length(&fitted[2].1) < 0.9 * length(&fitted[1].1));
     }
 
@@ -364,7 +363,7 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let mut splats = some.clone();
             let cost = RestCost::new(std::iter::repeat_n(1e-6, 200), 1e-3);
-            pool.install(|| refining.refine(&mut splats, Free::All, Part::whole(20), &cost, &Silent)).unwrap();
+            pool.install(|| refining.refine(&mut splats, Free::All, 20, &cost, &Silent)).unwrap();
             splats
         };
         assert_eq!(fitted(1), fitted(3));

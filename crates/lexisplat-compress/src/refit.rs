@@ -12,11 +12,11 @@ use lexisplat::{AppearanceSensitivity, CompressReport, Geometry, Progress, Splat
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
 
 use crate::drawing::{DrawOptions, draw_views};
+use crate::effort::RefineSteps;
 use crate::error::Result;
 use crate::interim::interim_changes;
 use crate::only_cancels::OneStep;
-use crate::refine::Refining;
-use crate::settling::Settling;
+use crate::refine::{Free, Refining, RestCost};
 use crate::solve::{KEPT_BYTES, ROW, kinds, solve};
 
 /// Number of conjugate-gradient steps with given cameras and with found views. Each step takes about as long as drawing all
@@ -40,7 +40,7 @@ const GAIN_REFINED: f64 = 3.0;
 pub(crate) struct Refitting<S> {
     packer: Packer<S>,
     fit: Option<Fit>,
-    settling: Option<Settling>,
+    refining: Option<Refining>,
 }
 
 /// The views and pictures to which base colours and opacities are fitted.
@@ -59,18 +59,17 @@ impl<S: Borrow<Splats>> Refitting<S> {
     /// Returns files of `packer`. If there is a `fit`, their base colours and opacities are fitted to it; otherwise they
     /// are those of `packer`.
     pub(crate) fn new(packer: Packer<S>, fit: Option<Fit>) -> Self {
-        Self { packer, fit, settling: None }
+        Self { packer, fit, refining: None }
     }
 
     /// Refines files, if there is a `refining`, instead of fitting base colours and opacities alone.
     pub(crate) fn refining(self, refining: Option<Refining>) -> Self {
-        Self { settling: refining.map(Settling::new), ..self }
+        Self { refining, ..self }
     }
 
-    /// Returns whether files are refined. Their fits begin where those of the last file ended, so that the same step gives
-    /// another file when it is packed again.
+    /// Returns whether files are refined. Making the same file once more then takes minutes.
     pub(crate) fn refines(&self) -> bool {
-        self.settling.is_some()
+        self.refining.is_some()
     }
 
     /// Returns the number of Gaussians of the scene.
@@ -85,7 +84,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
 
     /// Returns the expected gain of the judged quality by refitting, in dB.
     pub(crate) fn gain(&self) -> f64 {
-        self.fit.as_ref().map_or(0.0, |fit| match &self.settling {
+        self.fit.as_ref().map_or(0.0, |fit| match &self.refining {
             Some(_) => GAIN_REFINED,
             None if fit.given => GAIN_GIVEN,
             None => GAIN_FOUND,
@@ -126,8 +125,8 @@ impl<S: Borrow<Splats>> Refitting<S> {
         let Some(fit) = &self.fit else { return Ok(Refitted::complete(file)) };
         let model = file.0.unpack()?;
         drop(file);
-        if let Some(settling) = &self.settling {
-            return settling.refit(step, quantised, model.into_splats(), progress);
+        if let Some(refining) = &self.refining {
+            return refined(refining, step, quantised, model.into_splats(), progress);
         }
         let shown = fit.appearances(Scene::from(&model), quantised.sensitivities(), progress)?;
         drop(model);
@@ -173,10 +172,42 @@ impl<S: Borrow<Splats>> Refitting<S> {
 /// A file with refitted base colours and opacities.
 pub(crate) struct Refitted<'a> {
     /// The fitted colours and opacities; `None` if nothing is left to fit.
-    pub(crate) shown: Option<Vec<Appearance>>,
+    shown: Option<Vec<Appearance>>,
     /// The scene with fitted SH-rest, if that was fitted.
-    pub(crate) again: Option<Quantised<'a>>,
+    again: Option<Quantised<'a>>,
     pub(crate) file: (Packed, CompressReport),
+}
+
+/// Fits the SH-rest, the base colours and the opacities of `model`, a file of `quantised`, codes the SH-rest, and then fits
+/// base colours and opacities once more.
+fn refined<'a>(
+    refining: &Refining,
+    step: f64,
+    quantised: &Quantised<'a>,
+    mut model: Splats,
+    progress: &dyn Progress,
+) -> Result<Refitted<'a>> {
+    let RefineSteps { radiance, appearance, .. } = refining.steps;
+    let cost = RestCost::new(quantised.sensitivities().iter().map(|s| s.colour), step);
+    refining.refine(&mut model, Free::Radiance, radiance, &cost, progress)?;
+    let again = quantised.with_sh_rest(&model.sh_rest, progress)?;
+    let shown = appearances(&model.geometry);
+    let mut model = again.finish(Some(&shown), None, progress)?.0.unpack()?.into_splats();
+    for (i, shown) in shown.into_iter().enumerate() {
+        shown.give(&mut model.geometry, i);
+    }
+    refining.refine(&mut model, Free::Appearance, appearance, &cost, progress)?;
+    let shown = appearances(&model.geometry);
+    let file = again.finish(Some(&shown), None, progress)?;
+    Ok(Refitted { shown: Some(shown), again: Some(again), file })
+}
+
+fn appearances(geometry: &Geometry) -> Vec<Appearance> {
+    let shown = |i| {
+        let shown = Appearance::of(geometry, i);
+        Appearance { log_opacity: shown.log_opacity.min(0.0), ..shown }
+    };
+    (0..geometry.len()).map(shown).collect()
 }
 
 impl Refitted<'_> {

@@ -5,6 +5,8 @@
 //! drawn. The squares lie evenly over a picture, and at other places in the next view. On average over all places, the mean
 //! squared error of the squares is the mean squared error of whole pictures.
 
+use std::ops::RangeInclusive;
+
 use lexisplat_render::conventions::TILE;
 use lexisplat_render::{Camera, PLASTIC, TileSet};
 
@@ -24,21 +26,38 @@ pub(crate) fn sampled(cameras: Vec<Camera>, pixels: u64) -> Vec<Camera> {
         return cameras;
     }
     let share = pixels as f64 / all as f64;
-    cameras.into_iter().enumerate().map(|(k, camera)| squares_of(camera, share, k)).collect()
+    cameras.into_iter().enumerate().map(|(k, camera)| squares_of(camera, 0.0..=share, k)).collect()
 }
 
-/// Returns `camera`, the `k`-th, restricted to this share of its squares.
-fn squares_of(camera: Camera, share: f64, k: usize) -> Camera {
+/// Returns the cameras as [`sampled`] does, and then again with other squares, until these draw about `most` pixels in all or
+/// every square once.
+pub(crate) fn sampled_again(cameras: Vec<Camera>, pixels: u64, most: u64) -> Vec<Camera> {
+    let all: u64 = cameras.iter().map(Camera::drawn_pixels).sum();
+    let times = (most.min(all) as f64 / pixels.max(1) as f64).round();
+    let mut some = sampled(cameras.clone(), pixels);
+    let share = pixels as f64 / all.max(1) as f64;
+    let mut from = share;
+    while from < (times - 0.5) * share {
+        let squares = |(k, camera): (usize, &Camera)| squares_of(camera.clone(), from..=from + share, k);
+        some.extend(cameras.iter().enumerate().map(squares));
+        from += share;
+    }
+    some
+}
+
+/// Returns `camera`, the `k`-th, restricted to the squares with these phases, from 0 to 1.
+fn squares_of(camera: Camera, phases: RangeInclusive<f64>, k: usize) -> Camera {
     let begin = (k as f64 * GOLDEN).fract();
     let phase = |x: u32, y: u32| (begin + f64::from(x) * PLASTIC[0] + f64::from(y) * PLASTIC[1]).fract();
-    let chosen =
-        |limit: f64| TileSet::new(camera.width, camera.height, |x, y| phase(x / SQUARE, y / SQUARE) <= limit);
-    let mut set = chosen(share);
+    let chosen = |phases: RangeInclusive<f64>| {
+        TileSet::new(camera.width, camera.height, |x, y| phases.contains(&phase(x / SQUARE, y / SQUARE)))
+    };
+    let mut set = chosen(phases);
     if set.tiles().is_empty() {
         // A small picture has at least one square: that with the lowest phase.
         let squares = |side: u32| 0..side.div_ceil(SQUARE * TILE_PIXELS);
         let phases = squares(camera.width).flat_map(|x| squares(camera.height).map(move |y| phase(x, y)));
-        set = chosen(phases.fold(1.0, f64::min));
+        set = chosen(0.0..=phases.fold(1.0, f64::min));
     }
     camera.with_tiles(set)
 }

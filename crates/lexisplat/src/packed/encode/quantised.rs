@@ -205,11 +205,6 @@ impl<'a> Quantised<'a> {
         &self.gaussians.sensitivities
     }
 
-    /// Returns the index of each Gaussian in the scene, in the order of the file.
-    pub fn source_indices(&self) -> impl Iterator<Item = usize> {
-        self.gaussians.keys.iter().map(|key| key.index())
-    }
-
     /// Makes the file. `appearances` replaces the scene's own base colours and opacities, with one entry for each Gaussian
     /// in the order of the file. `changes` are the interim changes of the Gaussians of the first layer, for the time while
     /// the second layer is missing. They are relative to the scene of [`Packed::first_layer`].
