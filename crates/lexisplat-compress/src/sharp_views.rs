@@ -87,6 +87,28 @@ mod tests {
     }
 
     #[test]
+    fn later_rounds_draw_other_squares() {
+        let splats = scene(&SampleOptions::new(50, 1));
+        let cameras = orbit(&splats.geometry, 4, 640, 400);
+        let all: u64 = 4 * 640 * 400;
+        assert_eq!(sampled_again(cameras.clone(), all, 2 * all), cameras);
+        let first = sampled(cameras.clone(), all / 5);
+        assert_eq!(sampled_again(cameras.clone(), all / 5, 0), first);
+        // Three rounds draw three fifths of the tiles, each tile once; five rounds draw all.
+        for (most, share) in [(3 * all / 5, 0.6), (2 * all, 1.0)] {
+            let some = sampled_again(cameras.clone(), all / 5, most);
+            assert_eq!(some[..4], first[..]);
+            let mut tiles: Vec<u32> =
+                some.iter().step_by(4).flat_map(|c| c.tiles.as_ref().unwrap().tiles().to_vec()).collect();
+            let drawn = tiles.len();
+            tiles.sort_unstable();
+            tiles.dedup();
+            assert_eq!(tiles.len(), drawn);
+            assert!((drawn as f64 / (40.0 * 25.0) - share).abs() < 0.03, "{drawn}");
+        }
+    }
+
+    #[test]
     fn squares_score_as_whole_pictures_do() {
         let splats = scene(&SampleOptions::new(1500, 3));
         let mut other = splats.clone();
