@@ -129,7 +129,8 @@ impl Differentiator {
         let factor = -2.0 / drawn;
         let sums = &self.sums;
         let rows = shown
-            .par_iter()
+            .as_slice()
+            .into_par_iter()
             .map(|splat| {
                 let i = splat.gaussian as usize;
                 let on_screen = OnScreen::of(splat, sums[i].map(|sum| factor * sum));
