@@ -214,6 +214,7 @@ impl Progress for Bars {
             Stage::Read => ("reading", "bytes"),
             Stage::Learn => ("learning", "rounds"),
             Stage::Look => ("looking", "Gaussians"),
+            Stage::Refine => ("refining", "steps"),
             Stage::Draw => ("drawing", "views"),
             Stage::Code => ("coding", "Gaussians"),
             Stage::Write => ("writing", "bytes"),

@@ -11,39 +11,88 @@ use crate::refit::Fit;
 /// Largest share of the Gaussians to remove before the sensitivity is measured again. A Gaussian shows more once its
 /// neighbours are gone (docs/METHOD.md, "At most so many").
 const SHARE: f64 = 0.25;
+/// Quality of all Gaussians, in dB, from which the number is interpolated if the first removal goes too far. Identical
+/// pictures have no finite PSNR.
+const FIRST_DB: f64 = 60.0;
 
-/// Returns at most `most` Gaussians of `splats`, those that show most, and their sensitivity in `views`. Their base colours
-/// and opacities are fitted to the targets of `fit`, which are pictures of all Gaussians. `sensitivity` is the sensitivity
-/// of `splats`.
-///
-/// # Errors
-/// As [`PackingViews::sensitivity`].
-pub(crate) fn at_most(
-    most: usize,
-    splats: &Splats,
-    sensitivity: Sensitivity,
-    views: &PackingViews,
-    renderer: &mut Renderer,
-    fit: &Fit,
-    progress: &dyn Progress,
-) -> Result<(Splats, Sensitivity)> {
-    let (mut splats, mut sensitivity) = (splats.clone(), sensitivity);
-    progress.begin(Stage::Look, (splats.len().saturating_sub(most)) as u64);
-    let inner = &OnlyCancels(progress);
-    while splats.len() > most {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number")]
-        let share = (splats.len() as f64 * SHARE).ceil() as usize;
-        let keep = all_but(share.min(splats.len() - most), &sensitivity.opacity);
-        let before = splats.len();
-        splats.retain(&keep);
-        sensitivity.retain(&keep);
-        let fitted = fit.appearances(Scene::from(&splats), &sensitivity.appearances(), inner)?;
-        fitted.iter().enumerate().for_each(|(i, shown)| shown.give(&mut splats.geometry, i));
-        sensitivity = views.sensitivity(renderer, &splats, inner)?;
-        progress.advance((before - splats.len()) as u64);
+/// Removes Gaussians, and fits base colours and opacities of the others.
+pub(crate) struct Removal<'a> {
+    /// The views that measure.
+    pub(crate) views: &'a PackingViews,
+    pub(crate) renderer: &'a mut Renderer,
+    /// The views to fit to, and their pictures of all Gaussians.
+    pub(crate) fit: &'a Fit,
+    pub(crate) progress: &'a dyn Progress,
+}
+
+impl Removal<'_> {
+    /// Returns at most `most` Gaussians of `splats`, those that show most, and their sensitivity. `sensitivity` is the
+    /// sensitivity of `splats`.
+    ///
+    /// # Errors
+    /// As [`PackingViews::sensitivity`].
+    pub(crate) fn at_most(
+        &mut self,
+        most: usize,
+        splats: &Splats,
+        sensitivity: Sensitivity,
+    ) -> Result<(Splats, Sensitivity)> {
+        let (mut splats, mut sensitivity) = (splats.clone(), sensitivity);
+        self.progress.begin(Stage::Look, (splats.len().saturating_sub(most)) as u64);
+        let inner = &OnlyCancels(self.progress);
+        while splats.len() > most {
+            let keep = all_but(share_of(&splats).min(splats.len() - most), &sensitivity.opacity);
+            let before = splats.len();
+            splats.retain(&keep);
+            sensitivity.retain(&keep);
+            let fitted = self.fit.appearances(Scene::from(&splats), &sensitivity.appearances(), inner)?;
+            fitted.iter().enumerate().for_each(|(i, shown)| shown.give(&mut splats.geometry, i));
+            sensitivity = self.views.sensitivity(self.renderer, &splats, inner)?;
+            self.progress.advance((before - splats.len()) as u64);
+        }
+        self.progress.end();
+        Ok((splats, sensitivity))
     }
-    progress.end();
-    Ok((splats, sensitivity))
+
+    /// Removes Gaussians of `splats` while the `quality` of the others is at least `decibels`, about. Returns the others and
+    /// their sensitivity, as [`Self::at_most`] does.
+    ///
+    /// # Errors
+    /// As [`Self::at_most`], and errors of `quality`.
+    pub(crate) fn down_to(
+        &mut self,
+        decibels: f64,
+        splats: &Splats,
+        sensitivity: Sensitivity,
+        quality: &mut dyn FnMut(&Splats) -> Result<f64>,
+    ) -> Result<(Splats, Sensitivity)> {
+        let (mut splats, mut sensitivity, mut before) = (splats.clone(), sensitivity, FIRST_DB);
+        while splats.len() > 1 {
+            let most = splats.len() - share_of(&splats);
+            let fewer = self.at_most(most, &splats, sensitivity.clone())?;
+            let after = quality(&fewer.0)?;
+            if after < decibels {
+                // The quality falls about evenly with the logarithm of the number.
+                let share = ((before - decibels) / (before - after)).clamp(0.0, 1.0);
+                let most = splats.len() as f64 * libm::pow(most as f64 / splats.len() as f64, share);
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a number of Gaussians"
+                )]
+                let most = most.round() as usize;
+                return self.at_most(most, &splats, sensitivity);
+            }
+            (splats, sensitivity, before) = (fewer.0, fewer.1, after);
+        }
+        Ok((splats, sensitivity))
+    }
+}
+
+/// Returns the number of Gaussians that are removed at once.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number")]
+fn share_of(splats: &Splats) -> usize {
+    (splats.len() as f64 * SHARE).ceil() as usize
 }
 
 /// Returns a mark for each of `changes`: false for the `count` smallest, true for the others. Of equal changes the last are
@@ -79,7 +128,8 @@ mod tests {
         let Looked { views, sensitivity } =
             Looked::at(&mut cpu, &all, None, Viewpoints::Auto, &Silent).unwrap();
         let fit = Fit::to(&all, views.fitting(&all), views.are_given(), &Silent).unwrap();
-        let made = at_most(400, &all, sensitivity, &views, &mut cpu, &fit, &Silent).unwrap();
+        let mut removal = Removal { views: &views, renderer: &mut cpu, fit: &fit, progress: &Silent };
+        let made = removal.at_most(400, &all, sensitivity).unwrap();
         assert_eq!((made.0.len(), made.1.len()), (400, 400));
         let mut guessed = all.clone();
         guessed.retain(&all_but(600, &Sensitivity::guess(&all.geometry).opacity));

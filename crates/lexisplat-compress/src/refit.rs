@@ -12,9 +12,11 @@ use lexisplat::{AppearanceSensitivity, CompressReport, Geometry, Progress, Splat
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
 
 use crate::drawing::{DrawOptions, draw_views};
+use crate::effort::RefineSteps;
 use crate::error::Result;
 use crate::interim::interim_changes;
 use crate::only_cancels::OneStep;
+use crate::refine::{Free, Refining, RestCost};
 use crate::solve::{KEPT_BYTES, ROW, kinds, solve};
 
 /// Number of conjugate-gradient steps with given cameras and with found views. Each step takes about as long as drawing all
@@ -31,14 +33,18 @@ const MOST_LOG_OPACITY: f32 = 0.5;
 /// Approximate gain of the judged quality by refitting, in dB, with given cameras and with found views.
 const GAIN_GIVEN: f64 = 4.0;
 pub(crate) const GAIN_FOUND: f64 = 0.8;
+/// Approximate gain of the judged quality by fits of a refined scene to what is quantised, in dB.
+const GAIN_REFINED: f64 = 3.0;
 
 /// A packer whose files are refitted, if refitting is allowed.
 pub(crate) struct Refitting<S> {
     packer: Packer<S>,
     fit: Option<Fit>,
+    refining: Option<Refining>,
 }
 
 /// The views and pictures to which base colours and opacities are fitted.
+#[derive(Clone)]
 pub(crate) struct Fit {
     cameras: Vec<Camera>,
     /// The original's pictures.
@@ -53,7 +59,17 @@ impl<S: Borrow<Splats>> Refitting<S> {
     /// Returns files of `packer`. If there is a `fit`, their base colours and opacities are fitted to it; otherwise they
     /// are those of `packer`.
     pub(crate) fn new(packer: Packer<S>, fit: Option<Fit>) -> Self {
-        Self { packer, fit }
+        Self { packer, fit, refining: None }
+    }
+
+    /// Refines files, if there is a `refining`, instead of fitting base colours and opacities alone.
+    pub(crate) fn refining(self, refining: Option<Refining>) -> Self {
+        Self { refining, ..self }
+    }
+
+    /// Returns whether files are refined. Making the same file once more then takes minutes.
+    pub(crate) fn refines(&self) -> bool {
+        self.refining.is_some()
     }
 
     /// Returns the number of Gaussians of the scene.
@@ -68,7 +84,11 @@ impl<S: Borrow<Splats>> Refitting<S> {
 
     /// Returns the expected gain of the judged quality by refitting, in dB.
     pub(crate) fn gain(&self) -> f64 {
-        self.fit.as_ref().map_or(0.0, |fit| if fit.given { GAIN_GIVEN } else { GAIN_FOUND })
+        self.fit.as_ref().map_or(0.0, |fit| match &self.refining {
+            Some(_) => GAIN_REFINED,
+            None if fit.given => GAIN_GIVEN,
+            None => GAIN_FOUND,
+        })
     }
 
     /// Returns the overall step for pictures of about this PSNR, in dB, after refitting.
@@ -95,19 +115,23 @@ impl<S: Borrow<Splats>> Refitting<S> {
     ///
     /// # Errors
     /// Errors of packing and drawing.
-    pub(crate) fn refit(
-        &self,
-        quantised: &Quantised<'_>,
+    pub(crate) fn refit<'a>(
+        &'a self,
+        step: f64,
+        quantised: &Quantised<'a>,
         file: (Packed, CompressReport),
         progress: &dyn Progress,
-    ) -> Result<Refitted> {
-        let Some(fit) = &self.fit else { return Ok(Refitted { shown: None, file }) };
+    ) -> Result<Refitted<'a>> {
+        let Some(fit) = &self.fit else { return Ok(Refitted::complete(file)) };
         let model = file.0.unpack()?;
         drop(file);
+        if let Some(refining) = &self.refining {
+            return refined(refining, step, quantised, model.into_splats(), progress);
+        }
         let shown = fit.appearances(Scene::from(&model), quantised.sensitivities(), progress)?;
         drop(model);
         let file = quantised.finish(Some(&shown), None, progress)?;
-        Ok(Refitted { shown: Some(shown), file })
+        Ok(Refitted { shown: Some(shown), again: None, file })
     }
 
     /// Fits the pictures of the first layer alone of a file of `quantised`, if it has a first layer. The whole scene stays
@@ -118,15 +142,15 @@ impl<S: Borrow<Splats>> Refitting<S> {
     pub(crate) fn complete(
         &self,
         quantised: &Quantised<'_>,
-        refitted: Refitted,
+        refitted: Refitted<'_>,
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
-        let Refitted { shown, file } = refitted;
+        let Refitted { shown, again, file } = refitted;
         let (Some(fit), Some(shown)) = (&self.fit, shown) else { return Ok(file) };
         let Some(first) = file.0.first_layer()? else { return Ok(file) };
         drop(file);
         let changes = interim_changes(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
-        Ok(quantised.finish(Some(&shown), Some(&changes), progress)?)
+        Ok(again.as_ref().unwrap_or(quantised).finish(Some(&shown), Some(&changes), progress)?)
     }
 
     /// Packs at an overall `step`: calls [`Self::quantise`], [`Self::refit`] and [`Self::complete`].
@@ -140,22 +164,56 @@ impl<S: Borrow<Splats>> Refitting<S> {
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
         let (quantised, first) = self.quantise(step, floor, progress)?;
-        let refitted = self.refit(&quantised, first, progress)?;
+        let refitted = self.refit(step, &quantised, first, progress)?;
         self.complete(&quantised, refitted, progress)
     }
 }
 
 /// A file with refitted base colours and opacities.
-pub(crate) struct Refitted {
+pub(crate) struct Refitted<'a> {
     /// The fitted colours and opacities; `None` if nothing is left to fit.
     shown: Option<Vec<Appearance>>,
+    /// The scene with fitted SH-rest, if that was fitted.
+    again: Option<Quantised<'a>>,
     pub(crate) file: (Packed, CompressReport),
 }
 
-impl Refitted {
+/// Fits the SH-rest, the base colours and the opacities of `model`, a file of `quantised`, codes the SH-rest, and then fits
+/// base colours and opacities once more.
+fn refined<'a>(
+    refining: &Refining,
+    step: f64,
+    quantised: &Quantised<'a>,
+    mut model: Splats,
+    progress: &dyn Progress,
+) -> Result<Refitted<'a>> {
+    let RefineSteps { radiance, appearance, .. } = refining.steps;
+    let cost = RestCost::new(quantised.sensitivities().iter().map(|s| s.colour), step);
+    refining.refine(&mut model, Free::Radiance, radiance, &cost, progress)?;
+    let again = quantised.with_sh_rest(&model.sh_rest, progress)?;
+    let shown = appearances(&model.geometry);
+    let mut model = again.finish(Some(&shown), None, progress)?.0.unpack()?.into_splats();
+    for (i, shown) in shown.into_iter().enumerate() {
+        shown.give(&mut model.geometry, i);
+    }
+    refining.refine(&mut model, Free::Appearance, appearance, &cost, progress)?;
+    let shown = appearances(&model.geometry);
+    let file = again.finish(Some(&shown), None, progress)?;
+    Ok(Refitted { shown: Some(shown), again: Some(again), file })
+}
+
+fn appearances(geometry: &Geometry) -> Vec<Appearance> {
+    let shown = |i| {
+        let shown = Appearance::of(geometry, i);
+        Appearance { log_opacity: shown.log_opacity.min(0.0), ..shown }
+    };
+    (0..geometry.len()).map(shown).collect()
+}
+
+impl Refitted<'_> {
     /// Wraps a file of which nothing is left to fit.
     pub(crate) fn complete(file: (Packed, CompressReport)) -> Self {
-        Self { shown: None, file }
+        Self { shown: None, again: None, file }
     }
 }
 

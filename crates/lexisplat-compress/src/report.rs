@@ -67,6 +67,8 @@ pub struct CompressionReport {
     pub device: Option<String>,
     /// Number of Gaussians of the source that were left out.
     pub removed: u64,
+    /// The result of refining, if the scene was refined.
+    pub refined: Option<RefineReport>,
     /// Whether a packed scene was measured and packed part by part.
     pub in_parts: bool,
     /// Number of rounds of learning. `None` if the dictionary was given or the file is packed. So are the next two fields.
@@ -110,6 +112,20 @@ pub fn uncertain_by(reached: &ReachedRecord) -> Option<f64> {
 pub fn overshoot(target: &TargetRecord) -> Option<f64> {
     let above = target.mean_psnr - target.min_psnr;
     (target.kind == MIN_PSNR && above > MUCH_ABOVE).then_some(above)
+}
+
+/// The result of refining, before quantisation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct RefineReport {
+    /// Number of steps of the fit of all values.
+    pub steps: usize,
+    /// Number of Gaussians that were fitted.
+    pub gaussians: usize,
+    /// Judged PSNR of their pictures before the fit, in dB.
+    pub before_psnr: f64,
+    /// Judged PSNR of their pictures after the fit, in dB.
+    pub after_psnr: f64,
 }
 
 /// Origin of the sensitivity of a scene.

@@ -7,12 +7,13 @@ use lexisplat_render::{Camera, Renderer};
 
 use crate::belonging::belong;
 use crate::error::{Error, Result};
-use crate::fewer::at_most;
+use crate::fewer::Removal;
 use crate::first_view::first_view;
 use crate::judge::{Judge, reached};
 use crate::packing::{Compression, Packing, Quality};
 use crate::packing_views::Looked;
 use crate::parts::in_parts;
+use crate::refine::Refining;
 use crate::refit::{Fit, Refitting};
 use crate::report::{CompressionReport, SensitivitySource};
 use crate::signs::near_plane_hides;
@@ -174,19 +175,42 @@ impl Packing {
 
         let clock = Stopwatch::start();
         let given = views.are_given();
+        let hidden = given.then(|| near_plane_hides(&splats.geometry, views.measuring())).flatten();
+        let (views, sensitivity, fitted) = match self.refine {
+            Some(_) => {
+                let (views, fitted) = views.for_refining(&mut renderer, &splats, progress)?;
+                let sensitivity = match given {
+                    true => views.sensitivity(&mut renderer, &splats, progress)?,
+                    false => sensitivity,
+                };
+                (views, sensitivity, fitted)
+            }
+            None => (views, sensitivity, Vec::new()),
+        };
         let fit = match self.options.may_change() {
             true => Some(Fit::to(&splats, views.fitting(&splats), given, progress)?),
             false => None,
         };
-        let hidden = given.then(|| near_plane_hides(&splats.geometry, views.measuring())).flatten();
         let most = self.max_gaussians.filter(|&most| most < splats.len());
-        let (fewer, sensitivity) = match (most, &fit) {
-            (Some(most), Some(fit)) => {
-                let made = at_most(most, &splats, sensitivity, &views, &mut renderer, fit, progress)?;
-                (Some(made.0), made.1)
+        let (mut fewer, mut sensitivity) = (None, sensitivity);
+        let (mut refining, mut refined) = (None, None);
+        if let Some(fit) = &fit {
+            let mut removal = Removal { views: &views, renderer: &mut renderer, fit, progress };
+            if let Some(most) = most {
+                let made = removal.at_most(most, &splats, sensitivity)?;
+                (fewer, sensitivity) = (Some(made.0), made.1);
             }
-            _ => (None, sensitivity),
-        };
+            if let Some(effort) = self.refine {
+                let to = Refining::to(&splats, fitted, effort, progress)?;
+                let judges = views.some_judging(PRESET_JUDGES);
+                let mut judge = Judge::new(self.renderer()?, &splats, &judges, given, progress)?;
+                let start = fewer.as_ref().unwrap_or(&splats);
+                let bytes = source.source_bytes();
+                let made = self.reduced(start, sensitivity, &mut removal, &to, &mut judge, bytes)?;
+                (fewer, sensitivity) = (Some(made.0), made.1);
+                (refining, refined) = (Some(to), Some(made.2));
+            }
+        }
         let packed_scene = fewer.as_ref().unwrap_or(&splats);
         let options = match self.options.points_of_view.is_empty() {
             true => self.options.clone().with_points_of_view(views.points_of_view(POINTS_OF_VIEW)),
@@ -194,14 +218,15 @@ impl Packing {
         };
         let packer = Packer::new(packed_scene, &sensitivity, &options)?;
         drop(sensitivity);
-        let refitting = Refitting::new(packer, fit);
+        let refitting = Refitting::new(packer, fit).refining(refining);
         let (packed, report, judge, score) = match self.quality {
             Quality::Preset(preset) => {
                 // A preset cannot make up for Gaussians that a limit removes, so it is judged against the reduced scene.
                 let judges = views.some_judging(PRESET_JUDGES);
-                let mut judge = Judge::new(renderer, packed_scene, &judges, given, progress)?;
+                let judged_by = if most.is_some() { packed_scene } else { &splats };
+                let mut judge = Judge::new(renderer, judged_by, &judges, given, progress)?;
                 let (packed, report, mut score) = pack_to_preset(&refitting, &mut judge, preset, progress)?;
-                if fewer.is_some() {
+                if most.is_some() {
                     judge = judge.against(&splats, progress)?;
                     score = judge.score(&packed.unpack()?, progress)?;
                 }
@@ -232,7 +257,15 @@ impl Packing {
         let write_seconds = clock.seconds();
         let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);
         let warnings = hidden.into_iter().collect();
-        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, warnings, ..report })
+        Ok(CompressionReport {
+            read_seconds,
+            look_seconds,
+            pack_seconds,
+            write_seconds,
+            warnings,
+            refined,
+            ..report
+        })
     }
 }
 

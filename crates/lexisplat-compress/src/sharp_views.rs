@@ -5,6 +5,8 @@
 //! drawn. The squares lie evenly over a picture, and at other places in the next view. On average over all places, the mean
 //! squared error of the squares is the mean squared error of whole pictures.
 
+use std::ops::RangeInclusive;
+
 use lexisplat_render::conventions::TILE;
 use lexisplat_render::{Camera, PLASTIC, TileSet};
 
@@ -24,21 +26,38 @@ pub(crate) fn sampled(cameras: Vec<Camera>, pixels: u64) -> Vec<Camera> {
         return cameras;
     }
     let share = pixels as f64 / all as f64;
-    cameras.into_iter().enumerate().map(|(k, camera)| squares_of(camera, share, k)).collect()
+    cameras.into_iter().enumerate().map(|(k, camera)| squares_of(camera, 0.0..=share, k)).collect()
 }
 
-/// Returns `camera`, the `k`-th, restricted to this share of its squares.
-fn squares_of(camera: Camera, share: f64, k: usize) -> Camera {
+/// Returns the cameras as [`sampled`] does, and then again with other squares, until these draw about `most` pixels in all or
+/// every square once.
+pub(crate) fn sampled_again(cameras: Vec<Camera>, pixels: u64, most: u64) -> Vec<Camera> {
+    let all: u64 = cameras.iter().map(Camera::drawn_pixels).sum();
+    let times = (most.min(all) as f64 / pixels.max(1) as f64).round();
+    let mut some = sampled(cameras.clone(), pixels);
+    let share = pixels as f64 / all.max(1) as f64;
+    let mut from = share;
+    while from < (times - 0.5) * share {
+        let squares = |(k, camera): (usize, &Camera)| squares_of(camera.clone(), from..=from + share, k);
+        some.extend(cameras.iter().enumerate().map(squares));
+        from += share;
+    }
+    some
+}
+
+/// Returns `camera`, the `k`-th, restricted to the squares with these phases, from 0 to 1.
+fn squares_of(camera: Camera, phases: RangeInclusive<f64>, k: usize) -> Camera {
     let begin = (k as f64 * GOLDEN).fract();
     let phase = |x: u32, y: u32| (begin + f64::from(x) * PLASTIC[0] + f64::from(y) * PLASTIC[1]).fract();
-    let chosen =
-        |limit: f64| TileSet::new(camera.width, camera.height, |x, y| phase(x / SQUARE, y / SQUARE) <= limit);
-    let mut set = chosen(share);
+    let chosen = |phases: RangeInclusive<f64>| {
+        TileSet::new(camera.width, camera.height, |x, y| phases.contains(&phase(x / SQUARE, y / SQUARE)))
+    };
+    let mut set = chosen(phases);
     if set.tiles().is_empty() {
         // A small picture has at least one square: that with the lowest phase.
         let squares = |side: u32| 0..side.div_ceil(SQUARE * TILE_PIXELS);
         let phases = squares(camera.width).flat_map(|x| squares(camera.height).map(move |y| phase(x, y)));
-        set = chosen(phases.fold(1.0, f64::min));
+        set = chosen(0.0..=phases.fold(1.0, f64::min));
     }
     camera.with_tiles(set)
 }
@@ -65,6 +84,28 @@ mod tests {
             assert!(some.windows(2).all(|pair| pair[0].tiles != pair[1].tiles));
         }
         assert!(sampled(cameras, 1).iter().all(|camera| camera.drawn_pixels() > 0));
+    }
+
+    #[test]
+    fn later_rounds_draw_other_squares() {
+        let splats = scene(&SampleOptions::new(50, 1));
+        let cameras = orbit(&splats.geometry, 4, 640, 400);
+        let all: u64 = 4 * 640 * 400;
+        assert_eq!(sampled_again(cameras.clone(), all, 2 * all), cameras);
+        let first = sampled(cameras.clone(), all / 5);
+        assert_eq!(sampled_again(cameras.clone(), all / 5, 0), first);
+        // Three rounds draw three fifths of the tiles, each tile once; five rounds draw all.
+        for (most, share) in [(3 * all / 5, 0.6), (2 * all, 1.0)] {
+            let some = sampled_again(cameras.clone(), all / 5, most);
+            assert_eq!(some[..4], first[..]);
+            let mut tiles: Vec<u32> =
+                some.iter().step_by(4).flat_map(|c| c.tiles.as_ref().unwrap().tiles().to_vec()).collect();
+            let drawn = tiles.len();
+            tiles.sort_unstable();
+            tiles.dedup();
+            assert_eq!(tiles.len(), drawn);
+            assert!((drawn as f64 / (40.0 * 25.0) - share).abs() < 0.03, "{drawn}");
+        }
     }
 
     #[test]

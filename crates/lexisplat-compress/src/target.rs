@@ -116,7 +116,8 @@ impl Target {
         }
     }
 
-    fn asked(self) -> f64 {
+    /// Returns the number that was asked for: decibels, bytes or a ratio.
+    pub(crate) fn asked(self) -> f64 {
         match self {
             Self::MeanPsnr(asked) | Self::MinPsnr(asked) | Self::Ratio(asked) => asked,
             Self::Size(bytes) => bytes as f64,
@@ -141,6 +142,11 @@ impl Target {
             Self::Ratio(ratio) => Self::Size((source_bytes as f64 / ratio) as u64),
             other => other,
         }
+    }
+
+    /// Returns the bytes that a size or a ratio means.
+    pub(crate) fn bytes(self, source_bytes: u64) -> f64 {
+        self.recorded(source_bytes).asked()
     }
 
     /// Returns the error of a target that is out of reach. `best` is the value that came nearest to it.
@@ -196,7 +202,7 @@ pub(crate) fn pack_to_preset(
         drop(file);
         (quantised, file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     }
-    let refitted = packer.refit(&quantised, file, progress)?;
+    let refitted = packer.refit(libm::exp2(log_step), &quantised, file, progress)?;
     let score = if is_first { first } else { judge.score(&refitted.file.0.unpack()?, progress)? };
     let off = (score.judged - aim).abs();
     let next = if off <= CLOSE_PRESET { None } else { after(log_step, score.judged) };
@@ -204,13 +210,20 @@ pub(crate) fn pack_to_preset(
         let (packed, report) = packer.complete(&quantised, refitted, progress)?;
         return Ok((packed, report, score));
     };
-    drop((quantised, refitted));
+    let kept = match packer.refines() {
+        true => Some(packer.complete(&quantised, refitted, progress)?),
+        false => None,
+    };
+    drop(quantised);
     let (packed, report) = packer.pack(libm::exp2(on_grid(next, STEPS_PER_OCTAVE)), true, progress)?;
     let last = judge.score(&packed.unpack()?, progress)?;
     if (last.judged - aim).abs() < off {
         return Ok((packed, report, last));
     }
-    let (packed, report) = packer.pack(libm::exp2(log_step), true, progress)?;
+    let (packed, report) = match kept {
+        Some(kept) => kept,
+        None => packer.pack(libm::exp2(log_step), true, progress)?,
+    };
     Ok((packed, report, score))
 }
 
@@ -311,7 +324,7 @@ impl Search {
                 continue;
             }
             passed = 0;
-            let mut refitted = packer.refit(&quantised, file, progress)?;
+            let mut refitted = packer.refit(libm::exp2(log_step), &quantised, file, progress)?;
             if self.is_size {
                 // The bytes of the first layer's changes count towards the size; the pictures of the first layer do not
                 // count.
@@ -333,7 +346,7 @@ impl Search {
                 if self.is_size { log_step < best.log_step } else { file_bytes < best.file_bytes }
             };
             if met && best.as_ref().is_none_or(is_better) {
-                let complete = self.is_size || is_close;
+                let complete = self.is_size || is_close || packer.refines();
                 let (packed, report) = match complete {
                     true => packer.complete(&quantised, refitted, progress)?,
                     false => refitted.file,

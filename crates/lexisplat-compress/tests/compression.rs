@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::{CompressOptions, Layout, Limits, Progress, Silent, Splats, Stage, lexi, ply};
 use lexisplat_compress::{
-    Compression, CompressionReport, Error, Looked, Packing, Quality, SensitivitySource, Target, Viewpoints,
+    Compression, CompressionReport, Error, Looked, Packing, Quality, Refine, SensitivitySource, Target,
+    Viewpoints,
 };
 use lexisplat_render::{Camera, Renderer, orbit};
 use lexisplat_sample::{SampleOptions, scene};
@@ -67,6 +68,40 @@ fn files_and_memory_are_the_same_as_source_and_sink() {
         assert_eq!(read.len() as u64 + of_file.removed, LEAST as u64);
         assert!(of_file.sh_bytes > 0.0 && of_file.sh_bytes < of_file.dense_sh_bytes as f64);
     }
+}
+
+/// A refined file takes fewer Gaussians and bytes for the same quality, by any target, and is the same on any number of
+/// threads.
+#[test]
+fn refined_files_are_smaller() {
+    let splats = scene(&SampleOptions::new(200, 0));
+    let packing = |quality: Quality| Packing::new(quality).with_cameras(orbit(&splats.geometry, 8, 64, 48));
+    let target = Quality::from(Target::MeanPsnr(30.0));
+    let (_, plain) = run(packing(target), &splats);
+    let (file, report) = run(packing(target).with_refine(Refine::Minutes(0.04)), &splats);
+    let refined = report.refined.unwrap();
+    assert!(refined.gaussians < plain.gaussians && report.gaussians <= refined.gaussians, "{refined:?}");
+    assert!(refined.after_psnr > refined.before_psnr && refined.steps > 10, "{refined:?}");
+    assert!(report.file_bytes < plain.file_bytes, "{} {}", report.file_bytes, plain.file_bytes);
+    assert!(report.reached.unwrap().mean_psnr >= 30.0);
+    let read = lexi::read_bytes("scene.lexi", &file, &Limits::default()).unwrap();
+    assert_eq!((read.len(), plain.refined), (report.gaussians, None));
+    let brief = Refine::Minutes(0.002);
+    let (_, report) = run(packing(Target::MinPsnr(26.0).into()).with_refine(brief), &splats);
+    assert!(report.reached.unwrap().min_psnr >= 26.0);
+    let of = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let sized = packing(Target::Size(6000).into()).with_refine(brief);
+        pool.install(|| run(sized, &splats))
+    };
+    let (one, two) = (of(1), of(2));
+    assert!(one.0 == two.0 && one.0.len() <= 6000, "{}", one.0.len());
+    for options in [PackOptions::default().with_keep_all(true), PackOptions::default().with_tolerance(0.1)] {
+        let error = refused(packing(Preset::Small.into()).with_refine(brief).with_options(options), &splats);
+        assert!(error.to_string().contains("refine"), "{error}");
+    }
+    let error = refused(packing(Preset::Small.into()).with_refine(Refine::Minutes(0.0)), &splats);
+    assert!(error.to_string().contains("minutes above 0"), "{error}");
 }
 
 #[test]

@@ -9,8 +9,8 @@ use lexisplat::{
     lexi,
 };
 use lexisplat_compress::{
-    Compression, CompressionReport, Error, Packing, Quality, Target, Viewpoints, WithView, choose_layout,
-    read_beside,
+    Compression, CompressionReport, Error, Packing, Quality, Refine, Target, Viewpoints, WithView,
+    choose_layout, read_beside,
 };
 use lexisplat_render::{Device, Pose, ViewSet};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
@@ -52,6 +52,8 @@ pub(crate) struct Choices {
     lod: bool,
     keep_all: bool,
     max_gaussians: Option<usize>,
+    /// `quick`, `thorough` or minutes.
+    refine: Option<String>,
     guess: bool,
     memory: Option<u64>,
     device: String,
@@ -91,7 +93,7 @@ impl Choices {
     }
 
     /// Returns the choices that only packed files have, without the targets.
-    fn packed_only(&self) -> [Named; 7] {
+    fn packed_only(&self) -> [Named; 8] {
         [
             ("guess", self.guess),
             ("cameras", self.cameras.is_some()),
@@ -100,6 +102,7 @@ impl Choices {
             ("keep_all", self.keep_all),
             ("lod", self.lod),
             ("max_gaussians", self.max_gaussians.is_some()),
+            ("refine", self.refine.is_some()),
         ]
     }
 
@@ -112,10 +115,12 @@ impl Choices {
         let goals = self.goals();
         (1..goals.len()).try_for_each(|k| refuse(&goals[..k], &goals[k..=k]))?;
         let [_, psnr, min_psnr, size, ratio] = goals;
-        let [guess, cameras, views, keep_order, keep_all, _, max_gaussians] = self.packed_only();
-        refuse(&[guess], &[psnr, min_psnr, size, ratio, cameras, views, max_gaussians])?;
+        let [guess, cameras, views, keep_order, keep_all, _, max_gaussians, refine] = self.packed_only();
+        refuse(&[guess], &[psnr, min_psnr, size, ratio, cameras, views, max_gaussians, refine])?;
         refuse(&[cameras], &[views])?;
-        refuse(&[max_gaussians], &[keep_all, keep_order, ("tol", self.tol.is_some())])?;
+        let keeping = [keep_all, keep_order, ("tol", self.tol.is_some())];
+        refuse(&[max_gaussians], &keeping)?;
+        refuse(&[refine], &keeping)?;
         refuse(&[("dictionary", has_dictionary)], &[("atoms", self.atoms.is_some())])
     }
 
@@ -144,7 +149,8 @@ impl Choices {
             .with_options(options)
             .with_gpu(device.open_gpu()?)
             .with_viewpoints(self.views.as_deref().map_or(Ok(Viewpoints::Auto), views)?)
-            .with_max_gaussians(self.max_gaussians);
+            .with_max_gaussians(self.max_gaussians)
+            .with_refine(self.refine.as_deref().map(str::parse::<Refine>).transpose()?);
         if let Some(bytes) = self.memory {
             packing = packing.with_memory(bytes);
         }

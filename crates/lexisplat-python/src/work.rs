@@ -75,6 +75,7 @@ impl Progress for Watch {
             Stage::Read => "read",
             Stage::Learn => "learn",
             Stage::Look => "look",
+            Stage::Refine => "refine",
             Stage::Draw => "draw",
             Stage::Code => "code",
             Stage::Write => "write",

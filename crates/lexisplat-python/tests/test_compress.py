@@ -30,6 +30,7 @@ VIEW = "0.5:-1:-4:0:0:0:1:4:1.25"
         (["--preset", "small", "--keep-order"], {"preset": "small", "keep_order": True}),
         (["--guess", "--lod"], {"guess": True, "lod": True}),
         (["--psnr", "30", "--max-gaussians", "900"], {"psnr": 30, "max_gaussians": 900}),
+        (["--psnr", "25", "--refine", "0.01"], {"psnr": 25, "refine": 0.01}),
         (["--ratio", "12", "--atoms", "40", "--seed", "7"], {"ratio": 12, "atoms": 40, "seed": 7}),
         (["--guess"], {"guess": True}),
         (["--tol", "0.05"], {"tol": 0.05}),

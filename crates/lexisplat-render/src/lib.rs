@@ -43,6 +43,7 @@
 extern crate self as lexisplat_render;
 
 mod aside;
+mod between;
 mod bulk;
 mod camera;
 mod cameras_json;
@@ -80,6 +81,7 @@ mod view_set;
 mod wait;
 
 pub use aside::aside;
+pub use between::between;
 pub use bulk::bulk;
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, read_cameras_bytes};
@@ -87,7 +89,8 @@ pub use colmap::{MAX_COLMAP_BYTES, read_colmap_binary, read_colmap_text};
 #[cfg(feature = "gpu")]
 pub use cpu::CpuScene;
 pub use cpu::{
-    Drawn, GaussianChange, PictureAdjoint, PictureErrors, RenderOptions, render, render_measured, sensitivity,
+    Differentiator, Drawn, GaussianChange, GaussianGradient, PictureAdjoint, PictureErrors, PictureGradient,
+    RenderOptions, render, render_measured, sensitivity,
 };
 pub use error::{Error, Result};
 pub use image::Image;

@@ -22,6 +22,7 @@ mod gpu_pictures;
 mod gpu_sensitivity;
 #[cfg(feature = "gpu")]
 mod gpu_sparse;
+mod gradient;
 mod made;
 #[expect(clippy::cast_sign_loss, reason = "pixels are not negative")]
 mod naive;

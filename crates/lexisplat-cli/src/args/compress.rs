@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
-use lexisplat_compress::{Viewpoints, choose_layout};
+use lexisplat_compress::{Refine, Viewpoints, choose_layout};
 use lexisplat_render::Device;
 
 use super::part::Part;
@@ -84,6 +84,12 @@ pub(crate) struct Compress {
     /// original scene [default: no limit].
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) max_gaussians: Option<usize>,
+    /// Remove more Gaussians, and fit the others to pictures of the scene: positions, shapes, colours and opacities. The
+    /// file is smaller at the same quality and draws faster. `quick` and `thorough` are numbers of steps; MINUTES is
+    /// about the time on one thread, such as 5. The scene is held in memory as a whole [default when the option is
+    /// given without a value: quick].
+    #[arg(long, value_name = "quick|thorough|MINUTES", num_args = 0..=1, default_missing_value = "quick", conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
+    pub(crate) refine: Option<Refine>,
     /// Largest error of each Gaussian's SH vector, above 0, such as 0.05: the L2 norm of the difference, not squared.
     /// The encoder verifies the bound for every Gaussian. Without --layout the layout is f16, which keeps all other
     /// values exactly. With --layout packed all other values are quantised
@@ -163,7 +169,7 @@ impl Compress {
     }
 
     /// Returns the options that only packed files have, and for each whether it is given.
-    fn packed_only(&self) -> [(&'static str, bool); 12] {
+    fn packed_only(&self) -> [(&'static str, bool); 13] {
         [
             ("--guess", self.guess),
             ("--preset", self.preset.is_some()),
@@ -177,6 +183,7 @@ impl Compress {
             ("--lod", self.lod),
             ("--keep-all", self.keep_all),
             ("--max-gaussians", self.max_gaussians.is_some()),
+            ("--refine", self.refine.is_some()),
         ]
     }
 

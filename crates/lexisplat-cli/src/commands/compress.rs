@@ -13,8 +13,8 @@ use lexisplat::{
     SplatSource, lexi,
 };
 use lexisplat_compress::{
-    Compression, CompressionReport, Packing, Quality, SensitivitySource, Target, WithView, overshoot,
-    read_beside, uncertain_by,
+    Compression, CompressionReport, Packing, Quality, RefineReport, SensitivitySource, Target, WithView,
+    overshoot, read_beside, uncertain_by,
 };
 use lexisplat_eval::format;
 use lexisplat_formats::{Opened, open};
@@ -196,6 +196,7 @@ fn compression(args: &Compress, given: Option<&ViewSet>, limits: &Limits) -> Res
         .with_gpu(open_gpu(args.device)?)
         .with_viewpoints(args.views.unwrap_or_default())
         .with_max_gaussians(args.max_gaussians)
+        .with_refine(args.refine)
         .with_memory(args.memory);
     if let Some(set) = given {
         packing = packing.with_cameras(set.cameras.clone());
@@ -277,6 +278,13 @@ fn details(report: &CompressionReport) -> Result<String> {
     line("bits each", bits.join(", "))?;
     if report.removed > 0 {
         line("left out", removed_line(report.removed))?;
+    }
+    if let Some(RefineReport { steps, gaussians, before_psnr, after_psnr, .. }) = report.refined {
+        let (steps, gaussians) = (format::count(steps as u64), format::count(gaussians as u64));
+        let text = format!(
+            "{gaussians} Gaussians in {steps} steps: {before_psnr:.2} to {after_psnr:.2} dB, before quantisation"
+        );
+        line("refined", text)?;
     }
     if let Some(reached) = &report.reached {
         line("pictures", reached_line(reached))?;

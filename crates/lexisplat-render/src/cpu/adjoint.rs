@@ -200,12 +200,12 @@ impl<'a> PictureAdjoint<'a> {
 }
 
 /// `N` values for each pixel of a tile, by column and row of blocks.
-type Light<const N: usize> = [[[Lanes; N]; BLOCKS]; BLOCKS];
+pub(super) type Light<const N: usize> = [[[Lanes; N]; BLOCKS]; BLOCKS];
 
 /// Returns the errors `target - picture` of the pixels of a finished tile, and the sum of all weights in each pixel. The
 /// values are 0 beyond the border.
 #[inline(always)]
-fn errors(picture: &Canvas, target: &Image, tile: Tile) -> Light<4> {
+pub(super) fn errors(picture: &Canvas, target: &Image, tile: Tile) -> Light<4> {
     let mut light = [[[[0.0; LANES]; 4]; BLOCKS]; BLOCKS];
     let width = target.width as usize;
     let [left, top] = tile.drawn();
@@ -268,7 +268,7 @@ fn carried<const N: usize>(
         trace,
         tile,
         #[inline(always)]
-        |sums, [column, row], derivatives| add_carried::<N, N, 3>(sums, derivatives, &light[column][row]),
+        |_, sums, [column, row], derivatives| add_carried::<N, N, 3>(sums, derivatives, &light[column][row]),
     )
 }
 
@@ -291,7 +291,7 @@ fn carried_with_squares<const N: usize>(
         trace,
         tile,
         #[inline(always)]
-        |sums, [column, row], derivatives| {
+        |_, sums, [column, row], derivatives| {
             let light = &light[column][row];
             add_carried::<N, 8, 4>(sums, derivatives, light);
             sums[ROW_SUM] = products_added(&sums[ROW_SUM], &derivatives.weights, &light[3]);
@@ -334,11 +334,11 @@ fn products_added(sums: &Lanes, a: &Lanes, b: &Lanes) -> Lanes {
 /// Returns sums over the pixels of each splat in `trace`, with the index of its Gaussian. `add` adds the sums of one
 /// block.
 #[inline(always)]
-fn summed<const N: usize, const SUMS: usize>(
+pub(super) fn summed<const N: usize, const SUMS: usize>(
     picture: &Canvas,
     trace: &Trace,
     tile: Tile,
-    mut add: impl FnMut(&mut [Lanes; SUMS], [usize; 2], &Derivatives),
+    mut add: impl FnMut(&Splat, &mut [Lanes; SUMS], [usize; 2], &Derivatives),
 ) -> Vec<(u32, [f32; SUMS])> {
     let mut out: Vec<(u32, [f32; SUMS])> = Vec::with_capacity(trace.splats.len());
     let mut sums = [[0.0_f32; LANES]; SUMS];
@@ -352,7 +352,7 @@ fn summed<const N: usize, const SUMS: usize>(
             if last != Some(splat.gaussian) {
                 out.extend(last.replace(splat.gaussian).map(|gaussian| (gaussian, take(&mut sums))));
             }
-            add(&mut sums, block, derivatives);
+            add(splat, &mut sums, block, derivatives);
         },
     );
     out.extend(last.map(|gaussian| (gaussian, take(&mut sums))));
@@ -366,11 +366,11 @@ fn take<const N: usize>(sums: &mut [Lanes; N]) -> [f32; N] {
 }
 
 /// Derivatives of the pixels of a block by the values of a splat.
-struct Derivatives {
+pub(super) struct Derivatives {
     /// Derivatives of a colour channel by the same channel of the splat's colour.
-    weights: Lanes,
+    pub(super) weights: Lanes,
     /// Derivatives of the three channels by the logarithm of the splat's opacity.
-    by_opacity: [Lanes; 3],
+    pub(super) by_opacity: [Lanes; 3],
     /// Derivatives of the logarithm of the splat's opacity in the pixel by the logarithms of its scales; 0 unless `N` is
     /// [`WITH_SIZE`].
     power_by_size: Lanes,

@@ -12,6 +12,7 @@ mod adjoint;
 mod blend;
 mod change;
 mod clusters;
+mod gradient;
 mod grid;
 mod lanes;
 mod math;
@@ -25,6 +26,7 @@ mod project;
 mod sensitivity;
 mod splat;
 mod tiles;
+mod to_world;
 mod trace;
 #[cfg(all(test, feature = "gpu"))]
 pub(crate) mod twin;
@@ -42,6 +44,7 @@ use crate::scene::Scene;
 pub use adjoint::{GaussianChange, PictureAdjoint, PictureErrors};
 #[cfg(feature = "gpu")]
 pub(crate) use change::carry;
+pub use gradient::{Differentiator, GaussianGradient, PictureGradient};
 #[cfg(feature = "gpu")]
 pub(crate) use moments::{Moments, SUMS};
 use painting::{Painting, StageTimer};

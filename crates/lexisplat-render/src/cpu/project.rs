@@ -42,15 +42,15 @@ const PIXEL_MARGIN: f32 = TILE_F32 + 6.0;
 #[derive(Debug, Clone)]
 pub(crate) struct Projection {
     pub(super) camera: Camera,
-    tan: [f32; 2],
-    focal: [f32; 2],
+    pub(super) tan: [f32; 2],
+    pub(super) focal: [f32; 2],
     size: [f32; 2],
     /// [`W_EPSILON`], scaled in proportion to the near plane.
-    w_epsilon: f32,
+    pub(super) w_epsilon: f32,
     pub(super) grid: Grid,
     /// The tiles to draw; `None` draws all.
     pub(super) chosen: Option<ChosenTiles>,
-    antialiased: bool,
+    pub(super) antialiased: bool,
     /// Whether to leave out pixels where a Gaussian cannot reach [`ALPHA_MIN`]. This does not change the picture; tests
     /// compare with pictures drawn without it.
     tighten: bool,

@@ -7,6 +7,8 @@ use lexisplat_render::{Camera, Image};
 use rayon::prelude::*;
 
 struct Ellipse {
+    /// Number of the Gaussian.
+    gaussian: usize,
     centre: DVec2,
     conic: DMat2,
     opacity: f64,
@@ -14,6 +16,45 @@ struct Ellipse {
     depth: f64,
     /// Left, top, right, bottom in tiles; the last two excluded.
     tiles: [i64; 4],
+}
+
+/// Returns the numbers of the Gaussians that show at each pixel, nearest first.
+pub(crate) fn shown(splats: &Splats, camera: &Camera) -> Vec<Vec<usize>> {
+    let mut ellipses: Vec<Ellipse> = (0..splats.len()).filter_map(|i| project(splats, camera, i)).collect();
+    ellipses.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+    let (width, height) = (i64::from(camera.width), i64::from(camera.height));
+    let of = |p: i64| {
+        let (x, y) = (p % width, p / width);
+        let covers = |e: &&Ellipse| {
+            let [left, top, right, bottom] = e.tiles;
+            (left..right).contains(&(x / 16)) && (top..bottom).contains(&(y / 16))
+        };
+        let list: Vec<&Ellipse> = ellipses.iter().filter(covers).collect();
+        let mut shown = Vec::new();
+        pixel(&list, DVec2::new(x as f64, y as f64), DVec3::ZERO, |e| shown.push(e.gaussian));
+        shown
+    };
+    (0..width * height).map(of).collect()
+}
+
+/// Returns the mean over pixels of the squared errors beside `target`, summed over channels. The Gaussians of `shown` show at
+/// each pixel, whatever their opacity there is.
+pub(crate) fn loss(splats: &Splats, camera: &Camera, shown: &[Vec<usize>], target: &Image) -> f64 {
+    let ellipses: Vec<Option<Ellipse>> = (0..splats.len()).map(|i| project(splats, camera, i)).collect();
+    let width = target.width as usize;
+    let of = |p: usize| {
+        let at = DVec2::new((p % width) as f64, (p / width) as f64);
+        let (mut colour, mut transmittance) = (DVec3::ZERO, 1.0);
+        for e in shown[p].iter().filter_map(|&i| ellipses[i].as_ref()) {
+            let d = e.centre - at;
+            let alpha = (e.opacity * (-0.5 * d.dot(e.conic * d)).exp()).min(0.99);
+            colour += e.colour * alpha * transmittance;
+            transmittance *= 1.0 - alpha;
+        }
+        let target = DVec3::from_array(target.pixels[p].map(f64::from));
+        (colour.clamp(DVec3::ZERO, DVec3::ONE) - target.clamp(DVec3::ZERO, DVec3::ONE)).length_squared()
+    };
+    (0..shown.len()).map(of).sum::<f64>() / shown.len() as f64
 }
 
 pub(crate) fn render(splats: &Splats, camera: &Camera, background: [f32; 3]) -> Image {
@@ -39,6 +80,7 @@ pub(crate) fn render(splats: &Splats, camera: &Camera, background: [f32; 3]) -> 
                         &list,
                         DVec2::new((column * 16 + k % 16) as f64, (row * 16 + k / 16) as f64),
                         background,
+                        |_| (),
                     )
                 })
                 .collect()
@@ -53,7 +95,8 @@ pub(crate) fn render(splats: &Splats, camera: &Camera, background: [f32; 3]) -> 
     Image { width: camera.width, height: camera.height, pixels }
 }
 
-fn pixel(ellipses: &[&Ellipse], at: DVec2, background: DVec3) -> [f32; 3] {
+/// Returns the colour of a pixel, and calls `show` for each Gaussian that shows there.
+fn pixel(ellipses: &[&Ellipse], at: DVec2, background: DVec3, mut show: impl FnMut(&Ellipse)) -> [f32; 3] {
     let mut colour = DVec3::ZERO;
     let mut transmittance = 1.0;
     for e in ellipses {
@@ -70,6 +113,7 @@ fn pixel(ellipses: &[&Ellipse], at: DVec2, background: DVec3) -> [f32; 3] {
         if next < 0.0001 {
             break;
         }
+        show(e);
         colour += e.colour * alpha * transmittance;
         transmittance = next;
     }
@@ -136,7 +180,7 @@ fn project(splats: &Splats, camera: &Camera, i: usize) -> Option<Ellipse> {
         let sum: f64 = rest.iter().zip(&basis[1..]).map(|(&v, b)| f64::from(v) * b).sum();
         colour[c] = (0.5 + basis[0] * f64::from(g.dc[i][c]) + sum).max(0.0);
     }
-    Some(Ellipse { centre, conic: after.inverse(), opacity, colour, depth: view.z, tiles })
+    Some(Ellipse { gaussian: i, centre, conic: after.inverse(), opacity, colour, depth: view.z, tiles })
 }
 
 /// Real spherical harmonics from their definition: associated Legendre functions with the

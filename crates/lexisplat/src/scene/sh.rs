@@ -166,6 +166,57 @@ pub fn rest_basis(degree: ShDegree, direction: [f32; 3]) -> [f32; MAX_COEFFICIEN
     b
 }
 
+/// Returns the derivatives of the values of [`rest_basis`] by x, y and z of the direction, each as if the others stayed the same.
+#[must_use]
+pub fn rest_basis_slopes(degree: ShDegree, direction: [f32; 3]) -> [[f32; 3]; MAX_COEFFICIENTS - 1] {
+    let [x, y, z] = direction;
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    let mut slopes = [[0.0; 3]; MAX_COEFFICIENTS - 1];
+    let mut set = |first: usize, factors: &[f32], rows: &[[f32; 3]]| {
+        for ((slope, factor), row) in slopes[first..].iter_mut().zip(factors).zip(rows) {
+            *slope = row.map(|v| factor * v);
+        }
+    };
+    if degree.0 >= 1 {
+        set(0, &[-C1, C1, -C1], &[[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]);
+    }
+    if degree.0 >= 2 {
+        set(
+            3,
+            &C2,
+            &[[y, x, 0.0], [0.0, z, y], [-2.0 * x, -2.0 * y, 4.0 * z], [z, 0.0, x], [2.0 * x, -2.0 * y, 0.0]],
+        );
+    }
+    if degree.0 >= 3 {
+        let rows = [
+            [6.0 * x * y, 3.0 * (xx - yy), 0.0],
+            [y * z, x * z, x * y],
+            [-2.0 * x * y, 4.0 * zz - xx - 3.0 * yy, 8.0 * y * z],
+            [-6.0 * x * z, -6.0 * y * z, 6.0 * zz - 3.0 * (xx + yy)],
+            [4.0 * zz - 3.0 * xx - yy, -2.0 * x * y, 8.0 * x * z],
+            [2.0 * x * z, -2.0 * y * z, xx - yy],
+            [3.0 * (xx - yy), -6.0 * x * y, 0.0],
+        ];
+        set(8, &C3, &rows);
+    }
+    if degree.0 >= 4 {
+        let (seven, three) = (7.0 * zz - 1.0, 7.0 * zz - 3.0);
+        let rows = [
+            [y * (3.0 * xx - yy), x * (xx - 3.0 * yy), 0.0],
+            [6.0 * x * y * z, 3.0 * z * (xx - yy), y * (3.0 * xx - yy)],
+            [y * seven, x * seven, 14.0 * x * y * z],
+            [0.0, z * three, y * (21.0 * zz - 3.0)],
+            [0.0, 0.0, z * (140.0 * zz - 60.0)],
+            [z * three, 0.0, x * (21.0 * zz - 3.0)],
+            [2.0 * x * seven, -2.0 * y * seven, 14.0 * z * (xx - yy)],
+            [3.0 * z * (xx - yy), -6.0 * x * y * z, x * (xx - 3.0 * yy)],
+            [4.0 * x * (xx - 3.0 * yy), 4.0 * y * (yy - 3.0 * xx), 0.0],
+        ];
+        set(15, &C4, &rows);
+    }
+    slopes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -207,6 +258,27 @@ mod tests {
             for (j, value) in row.iter().enumerate() {
                 let expected = if i == j { 1.0 } else { 0.0 };
                 assert!((value * weight - expected).abs() < 2e-4, "{i} {j} {}", value * weight);
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_basis() {
+        const STEP: f32 = 1.0 / 128.0;
+        for degree in (0..=4).map(ShDegree) {
+            for direction in [[0.6, -0.64, 0.48], [0.0, 0.28, -0.96], [-0.8, 0.36, 0.48]] {
+                let slopes = rest_basis_slopes(degree, direction);
+                for axis in 0..3 {
+                    let [more, less] = [STEP, -STEP].map(|step| {
+                        let mut moved = direction;
+                        moved[axis] += step;
+                        rest_basis(degree, moved)
+                    });
+                    for k in 0..24 {
+                        let expected = (more[k] - less[k]) / (2.0 * STEP);
+                        assert!((slopes[k][axis] - expected).abs() < 2e-3, "{degree}: {k}, {axis}");
+                    }
+                }
             }
         }
     }

@@ -50,6 +50,8 @@ pub enum Stage {
     Write,
     /// Scores pictures, in views.
     Score,
+    /// Fits Gaussians to pictures, in steps.
+    Refine,
 }
 
 /// A [`Progress`] that ignores all reports and never cancels.

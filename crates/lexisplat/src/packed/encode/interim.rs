@@ -26,7 +26,7 @@ const OPACITY: f64 = 0.3;
 const NEIGHBOURS: usize = 16;
 
 /// The interim changes of all layers but the last.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct InterimChanges {
     /// For each Gaussian of these layers, the number of steps by which its scales grow.
     growth: Vec<i32>,

@@ -1,5 +1,6 @@
 //! A scene that is quantised with one overall step. Its base colours and opacities can still change.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use super::appearance::{Appearance, AppearanceChange};
@@ -18,7 +19,7 @@ use crate::packed::entropy::tables::Tables;
 use crate::packed::scene::Packed;
 use crate::scene::extra::{Extra, for_extra};
 use crate::scene::sensitivity::AppearanceSensitivity;
-use crate::scene::splats::Splats;
+use crate::scene::splats::{Splats, all_finite};
 use crate::sparse::model::Model;
 use crate::sparse::tally::{CompressReport, Tally};
 use crate::support::error::{Error, Result};
@@ -35,7 +36,7 @@ pub type Refit<'a, E = Error> =
     dyn FnMut(&Splats, &Model, &[AppearanceSensitivity]) -> Result<Option<Vec<Appearance>>, E> + 'a;
 
 /// The Gaussians of a file. All lists have the same order.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct Gaussians {
     /// The cell of each Gaussian, and its index in the source.
     pub(in crate::packed) keys: Vec<MortonKey>,
@@ -69,7 +70,7 @@ pub(in crate::packed) struct Fitted {
 }
 
 /// A chunk of a file.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct ChunkRows {
     layer: usize,
     /// Its Gaussians, by their index in the file.
@@ -81,7 +82,7 @@ struct ChunkRows {
 /// nothing else.
 #[derive(Debug)]
 pub struct Quantised<'a> {
-    splats: &'a Splats,
+    splats: Cow<'a, Splats>,
     options: &'a PackOptions,
     gaussians: Gaussians,
     chunks: Vec<ChunkRows>,
@@ -137,16 +138,53 @@ impl<'a> Quantised<'a> {
         let probability =
             |layer: usize, i: usize| encoding.layering.probability(layer, gaussians.sensitivities[i].opacity);
         let interim = InterimChanges::new(&splats.geometry, &gaussians.keys, &counts, probability);
-        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), interim, encoding };
-        let ordered = part.ordered(None)?;
-        let codes = part.chunks.iter().map(|ChunkRows { rows, .. }| {
+        let splats = Cow::Borrowed(splats);
+        let part = Self { splats, options, gaussians, chunks, codes: Vec::new(), interim, encoding };
+        part.coded(progress)
+    }
+
+    /// Chooses the codes of all chunks.
+    fn coded(mut self, progress: &dyn Progress) -> Result<Self> {
+        let ordered = self.ordered(None)?;
+        let codes = self.chunks.iter().map(|ChunkRows { rows, .. }| {
             progress.check()?;
-            let codes = part.encoding.coder.codes(ordered.slice(rows.clone()));
+            let codes = self.encoding.coder.codes(ordered.slice(rows.clone()));
             progress.advance(rows.len() as u64);
             Ok(codes)
         });
-        part.codes = codes.collect::<Result<_>>()?;
-        Ok(part)
+        self.codes = codes.collect::<Result<_>>()?;
+        Ok(self)
+    }
+
+    /// Returns the same Gaussians with codes of other SH-rest. `sh_rest` has a row for each Gaussian in the order of the
+    /// file. The dictionary and all steps stay, and so do the positions, scales and rotations of the file.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for rows that are too few, too many or not finite; [`Error::Cancelled`].
+    pub fn with_sh_rest(&self, sh_rest: &[f32], progress: &dyn Progress) -> Result<Self> {
+        let rest = self.splats.degree.rest();
+        let expected = self.len() * rest;
+        if sh_rest.len() != expected {
+            return Err(Error::parameter("sh_rest", sh_rest.len(), format!("{expected} values")));
+        }
+        all_finite([("sh_rest", sh_rest)])?;
+        let mut splats = Splats::clone(&self.splats);
+        for (g, row) in self.gaussians.keys.iter().zip(sh_rest.chunks_exact(rest.max(1))) {
+            splats.sh_rest[g.index() * rest..(g.index() + 1) * rest].copy_from_slice(row);
+        }
+        progress.begin(Stage::Code, self.len() as u64);
+        let again = Self {
+            splats: Cow::Owned(splats),
+            options: self.options,
+            gaussians: self.gaussians.clone(),
+            chunks: self.chunks.clone(),
+            codes: Vec::new(),
+            interim: self.interim.clone(),
+            encoding: self.encoding.clone(),
+        };
+        let again = again.coded(progress)?;
+        progress.end();
+        Ok(again)
     }
 
     /// Returns the number of Gaussians of the file.
@@ -237,7 +275,7 @@ impl<'a> Quantised<'a> {
             all.iter().try_for_each(Appearance::check)?;
         }
         let Gaussians { keys, classes, .. } = &self.gaussians;
-        Ok(OrderedGaussians { appearances, ..OrderedGaussians::new(self.splats, keys, classes) })
+        Ok(OrderedGaussians { appearances, ..OrderedGaussians::new(&self.splats, keys, classes) })
     }
 
     /// Calls `with` for each chunk of `ordered`, with its layer, the counts of its codes and its symbols. Returns the
@@ -315,7 +353,7 @@ impl<'a> Quantised<'a> {
             return Ok(None);
         };
         let model = self.finish(None, None, progress)?.0.unpack()?;
-        refit(self.splats, &model, self.sensitivities())
+        refit(&self.splats, &model, self.sensitivities())
     }
 }
 
@@ -351,6 +389,32 @@ mod tests {
         other.geometry.dc.clone_from(&expected.geometry.dc);
         other.geometry.opacities.clone_from(&expected.geometry.opacities);
         assert_eq!(other, expected);
+    }
+
+    #[test]
+    fn other_sh_rest_changes_nothing_else() {
+        let splats = crate::support::testing::scene(700, 5);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
+        let options = PackOptions::default();
+        let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
+        let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
+        let model =
+            |of: &Quantised<'_>| of.finish(None, None, &Silent).unwrap().0.unpack().unwrap().into_splats();
+        let own = model(&quantised);
+        // The scene's own rows in the order of the file give the same file.
+        let rows: Vec<f32> =
+            quantised.sources().iter().flat_map(|g| splats.rest(g.index())).copied().collect();
+        let same = quantised.with_sh_rest(&rows, &Silent).unwrap();
+        assert_eq!(model(&same), own);
+        let halved: Vec<f32> = rows.iter().map(|v| 0.5 * v).collect();
+        let other = model(&quantised.with_sh_rest(&halved, &Silent).unwrap());
+        assert_eq!(other.geometry, own.geometry);
+        let error = |rows: &[f32]| {
+            other.sh_rest.iter().zip(rows).map(|(a, b)| f64::from((a - b) * (a - b))).sum::<f64>()
+        };
+        assert!(error(&halved) < 0.1 * error(&rows), "{} {}", error(&halved), error(&rows));
+        assert!(quantised.with_sh_rest(&rows[1..], &Silent).is_err());
+        assert!(quantised.with_sh_rest(&vec![f32::NAN; rows.len()], &Silent).is_err());
     }
 
     #[test]

@@ -1,0 +1,98 @@
+//! The scene that a refined file is packed from: fewer Gaussians, fitted to the pictures of all.
+
+use lexisplat::packed::Packer;
+use lexisplat::{Sensitivity, Splats};
+
+use crate::effort::RefineSteps;
+use crate::error::{Error, Result};
+use crate::fewer::Removal;
+use crate::judge::{Judge, Score};
+use crate::packing::{Packing, Quality};
+use crate::refine::{Free, Refining, RestCost};
+use crate::report::RefineReport;
+use crate::target::Target;
+
+/// Amounts by which the quality of the Gaussians that stay may fall short of the quality asked for before they are refined,
+/// in dB. After a fit that gains too little more Gaussians stay, by the next amount.
+const BELOW: [f64; 3] = [1.0, -2.5, -6.0];
+/// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
+/// it needs so fine steps that the file becomes larger (docs/METHOD.md, "Refining").
+const ABOVE: f64 = 3.0;
+/// Bytes of a Gaussian in a refined file, from which a size gives the number of Gaussians.
+const BYTES_EACH: f64 = 10.5;
+/// Quality at which short rows of SH-rest pay if the target is a size, in dB.
+const SIZE_DB: f64 = 40.0;
+
+impl Packing {
+    /// Removes Gaussians of `splats` until the rest shows about the quality asked for, or can have about the size asked for.
+    /// Then fits the rest to `refining`. Returns it with its sensitivity. `sensitivity` is the sensitivity of `splats`, and
+    /// `source_bytes` the size of the source.
+    ///
+    /// # Errors
+    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
+    pub(crate) fn reduced(
+        &self,
+        splats: &Splats,
+        sensitivity: Sensitivity,
+        removal: &mut Removal<'_>,
+        refining: &Refining,
+        judge: &mut Judge,
+        source_bytes: u64,
+    ) -> Result<(Splats, Sensitivity, RefineReport)> {
+        let progress = removal.progress;
+        let (decibels, least) = match self.quality {
+            Quality::Target(target @ (Target::Size(_) | Target::Ratio(_))) => {
+                let bytes = target.bytes(source_bytes);
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a number of Gaussians"
+                )]
+                let most = (bytes / BYTES_EACH).ceil() as usize;
+                let made = removal.at_most(most.max(1), splats, sensitivity)?;
+                return self.fitted(made, removal, refining, judge, SIZE_DB);
+            }
+            Quality::Target(Target::MinPsnr(decibels)) => (decibels, true),
+            Quality::Target(target) => (target.asked(), false),
+            Quality::Preset(preset) => (preset.decibels(), false),
+        };
+        let value = |score: Score| Ok::<_, Error>(if least { score.least } else { score.judged });
+        let mut tries = BELOW.into_iter();
+        loop {
+            let below = tries.next();
+            let made = match below {
+                Some(below) => {
+                    let quality = &mut |splats: &Splats| value(judge.score(splats, progress)?);
+                    removal.down_to(decibels - below, splats, sensitivity.clone(), quality)?
+                }
+                None => (splats.clone(), sensitivity.clone()),
+            };
+            let fitted = self.fitted(made, removal, refining, judge, decibels)?;
+            if below.is_none() || value(judge.score(&fitted.0, progress)?)? >= decibels + ABOVE {
+                return Ok(fitted);
+            }
+        }
+    }
+
+    /// Fits a scene to `refining`, and measures its sensitivity again. `decibels` is the quality asked for.
+    fn fitted(
+        &self,
+        (mut splats, sensitivity): (Splats, Sensitivity),
+        removal: &mut Removal<'_>,
+        refining: &Refining,
+        judge: &mut Judge,
+        decibels: f64,
+    ) -> Result<(Splats, Sensitivity, RefineReport)> {
+        let progress = removal.progress;
+        let RefineSteps { all, .. } = refining.steps;
+        let before = judge.score(&splats, progress)?.judged;
+        let step = Packer::new(&splats, &sensitivity, &self.options)?.step_for(decibels);
+        let cost = RestCost::new(sensitivity.colour.iter().copied(), step);
+        refining.refine(&mut splats, Free::All, all, &cost, progress)?;
+        let after = judge.score(&splats, progress)?.judged;
+        let report =
+            RefineReport { steps: all, gaussians: splats.len(), before_psnr: before, after_psnr: after };
+        let sensitivity = removal.views.sensitivity(removal.renderer, &splats, progress)?;
+        Ok((splats, sensitivity, report))
+    }
+}

@@ -1,0 +1,246 @@
+//! The gradient of the squared errors of a picture by every value of the Gaussians that it shows.
+
+use lexisplat::Splats;
+use lexisplat::simd::Simd;
+
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::parallel::*;
+use crate::radiance::Radiance;
+use crate::scene::Scene;
+
+use super::adjoint::{Derivatives, Light, errors, summed};
+use super::blend::Tile;
+use super::lanes::{LANES, Lanes, each};
+use super::measured_tiles::{Pool, Scratch, measure_tiles};
+use super::project::Projection;
+use super::splat::Splat;
+use super::tiles::List;
+use super::to_world::{OnScreen, ToWorld};
+use super::workspace::Workspace;
+
+/// The derivatives of the squared errors of one picture by the values of one Gaussian, in the units of [`Geometry`](lexisplat::Geometry).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct GaussianGradient {
+    /// By the position.
+    pub position: [f32; 3],
+    /// By the natural logarithms of the standard deviations.
+    pub scales: [f32; 3],
+    /// By the quaternion as it is stored, real part first.
+    pub rotation: [f32; 4],
+    /// By the logit of the opacity.
+    pub opacity: f32,
+    /// By the base colour.
+    pub dc: [f32; 3],
+    /// By the colour towards the camera. The derivative by coefficient k of a channel's SH-rest is the k-th basis value times this.
+    pub colour: [f32; 3],
+    /// The unit vector from the camera to the Gaussian.
+    pub direction: [f32; 3],
+}
+
+/// The gradient of one picture.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct PictureGradient {
+    /// Mean over the drawn pixels of the squared errors, summed over the channels.
+    pub loss: f64,
+    /// The Gaussians that the picture shows, ascending.
+    pub gaussians: Vec<u32>,
+    /// The derivatives of `loss` by the values of each of `gaussians`.
+    pub rows: Vec<GaussianGradient>,
+}
+
+/// Draws pictures and finds their gradients. Memory is kept from one picture to the next.
+#[derive(Debug, Default)]
+pub struct Differentiator {
+    workspace: Workspace,
+    pool: Pool,
+    sums: Vec<[f32; SUMS]>,
+}
+
+/// Sums over the pixels of a splat, with the derivative g of the loss by the logarithm of the opacity at a pixel and the offset d of
+/// the centre from the pixel: three derivatives by the colour, then g, g dx, g dy, g dx dx, g dx dy, g dy dy.
+pub(super) const SUMS: usize = 9;
+/// Index of the sum of g.
+const OF_OPACITY: usize = 3;
+
+impl Differentiator {
+    /// Returns the gradient of the squared errors of the picture of `splats` from `camera` over black. An error is the difference
+    /// from `target`, with both clamped to 0 to 1; it is carried back as if the picture were not clamped.
+    ///
+    /// The gradient covers the pixels in which a Gaussian shows, but not those that it reaches only when it grows.
+    ///
+    /// # Errors
+    /// As [`crate::render`]; [`Error::Parameter`] if the target has another size than the camera's pictures.
+    pub fn gradient(&mut self, splats: &Splats, camera: &Camera, target: &Image) -> Result<PictureGradient> {
+        let scene = Scene::from(splats);
+        scene.validate()?;
+        camera.validate()?;
+        if camera.picture_size() != [target.width, target.height] {
+            let size = format!("{} x {}", target.width, target.height);
+            return Err(Error::parameter("target", size, "the size of its camera's pictures"));
+        }
+        let projection = Projection::new(camera, splats.meta.antialiased);
+        let [_, drawn] = projection.pixel_counts();
+        let radiance = Radiance::new(&scene);
+        self.workspace.project(&scene, &radiance, &projection);
+        self.sums.resize(splats.len() + 1, [0.0; SUMS]);
+        let loss = splats.len();
+        let simd = Simd::current();
+        let measure =
+            |splats: &[Splat], list: List<'_>, tile: Tile, Scratch { canvas, trace }: &mut Scratch| {
+                trace.clear();
+                simd.dispatch(
+                    #[inline(always)]
+                    || {
+                        canvas.draw_watched::<false>(splats, list, tile, trace);
+                        let light = errors(canvas, target, tile);
+                        let [x, y] = tile.coordinates();
+                        let mut found = summed::<4, SUMS>(
+                            canvas,
+                            trace,
+                            tile,
+                            #[inline(always)]
+                            |splat, sums, [column, row], derivatives| {
+                                add(splat, sums, [&x[column], &y[row]], derivatives, &light[column][row]);
+                            },
+                        );
+                        let mut own = [0.0; SUMS];
+                        own[0] = squares(&light);
+                        found.push((index(loss), own));
+                        found
+                    },
+                )
+            };
+        let sums = &mut self.sums;
+        let keep = |gaussian: usize, values: [f32; SUMS]| {
+            sums[gaussian].iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        };
+        measure_tiles(&mut self.workspace, &self.pool, &projection, measure, keep);
+        let loss = f64::from(std::mem::take(&mut self.sums[loss])[0]) / f64::from(drawn);
+        let slots = &self.workspace.visible.slots;
+        let mut shown: Vec<&Splat> =
+            self.workspace.order.keys.iter().map(|&(_, slot)| &slots[slot as usize]).collect();
+        shown.retain(|splat| self.sums[splat.gaussian as usize] != [0.0; SUMS]);
+        shown.sort_unstable_by_key(|splat| splat.gaussian);
+        let world = ToWorld::new(&projection);
+        // Errors are `target - picture`, and squares have twice their slope.
+        let factor = -2.0 / drawn;
+        let sums = &self.sums;
+        let rows = shown
+            .as_slice()
+            .into_par_iter()
+            .map(|splat| {
+                let i = splat.gaussian as usize;
+                let on_screen = OnScreen::of(splat, sums[i].map(|sum| factor * sum));
+                world.carry(&splats.geometry, splats.degree, rest_of(splats, i), i, splat, &on_screen)
+            })
+            .collect();
+        let gaussians: Vec<u32> = shown.iter().map(|splat| splat.gaussian).collect();
+        for &i in &gaussians {
+            self.sums[i as usize] = [0.0; SUMS];
+        }
+        Ok(PictureGradient { loss, gaussians, rows })
+    }
+}
+
+/// Returns the SH-rest of Gaussian `i`.
+fn rest_of(splats: &Splats, i: usize) -> &[f32] {
+    let dim = splats.degree.rest();
+    &splats.sh_rest[i * dim..(i + 1) * dim]
+}
+
+/// Returns a number of a Gaussian, of which there are fewer than 2^32.
+fn index(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}
+
+/// Returns the sum of the squared errors of a tile over pixels and channels.
+#[inline(always)]
+fn squares(light: &Light<4>) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    for block in light.as_flattened() {
+        for channel in &block[..3] {
+            [sums] = each([&sums, channel], |[sum, v]| [sum + v * v]);
+        }
+    }
+    sums.iter().sum()
+}
+
+/// Adds the products of one block's derivatives with its errors to the sums of `splat`.
+#[inline(always)]
+fn add(
+    splat: &Splat,
+    sums: &mut [Lanes; SUMS],
+    [x, y]: [&Lanes; 2],
+    Derivatives { weights, by_opacity, .. }: &Derivatives,
+    light: &[Lanes; 4],
+) {
+    for channel in 0..3 {
+        let inputs = [&sums[channel], weights, &light[channel]];
+        [sums[channel]] = each(inputs, |[sum, weight, light]| [sum + weight * light]);
+    }
+    let [red, green, blue] = by_opacity;
+    let [g] = each([red, green, blue, &light[0], &light[1], &light[2]], |[r, g, b, red, green, blue]| {
+        [r * red + g * green + b * blue]
+    });
+    let [px, py] = splat.centre;
+    let [gx, gy] = each([&g, x, y], |[g, x, y]| [g * (px - x), g * (py - y)]);
+    let [gxx, gxy, gyy] =
+        each([&gx, &gy, x, y], |[gx, gy, x, y]| [gx * (px - x), gx * (py - y), gy * (py - y)]);
+    for (sum, own) in sums[OF_OPACITY..].iter_mut().zip([&g, &gx, &gy, &gxx, &gxy, &gyy]) {
+        [*sum] = each([&*sum, own], |[sum, own]| [sum + own]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+    use crate::cpu::{RenderOptions, render};
+    use crate::orbit::orbit;
+
+    /// A few large, soft Gaussians that all lie within the picture, and a target that is darker everywhere.
+    fn sample(antialiased: bool) -> (Splats, Vec<Camera>, Vec<Image>) {
+        let mut splats = scene(&SampleOptions::new(12, 3));
+        splats.meta.antialiased = antialiased;
+        for i in 0..splats.len() {
+            let g = &mut splats.geometry;
+            let k = i as f32;
+            g.positions[i] = [0.3 * (1.7 * k).sin(), 0.3 * (2.9 * k).cos(), 0.3 * (0.9 * k).sin()];
+            g.scales[i] = [-1.6, -2.1 + 0.3 * k.sin(), -2.9 + 0.2 * k.cos()];
+            g.opacities[i] = 1.0 + 0.6 * (1.3 * k).sin();
+            g.dc[i] = g.dc[i].map(|v| 0.3 * v.tanh());
+        }
+        for v in &mut splats.sh_rest {
+            *v = 0.1 * v.tanh();
+        }
+        let cameras = orbit(&splats.geometry, 2, 140, 100);
+        let picture = |camera| render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
+        let targets = cameras.iter().map(picture).map(|mut image: Image| {
+            for (k, pixel) in image.pixels.iter_mut().enumerate() {
+                let (x, y) = ((k % 140) as f32 / 140.0, (k / 140) as f32 / 100.0);
+                *pixel = pixel.map(|v| v * (0.1 + 0.4 * x + 0.4 * y));
+            }
+            image
+        });
+        let targets = targets.collect();
+        (splats, cameras, targets)
+    }
+
+    #[test]
+    fn a_picture_like_its_target_has_no_gradient_and_sizes_must_agree() {
+        let (splats, cameras, targets) = sample(false);
+        let own = render(&Scene::from(&splats), &cameras[0], &RenderOptions::default()).unwrap();
+        let mut differentiator = Differentiator::default();
+        let found = differentiator.gradient(&splats, &cameras[0], &own).unwrap();
+        assert_eq!((found.loss, found.gaussians.len()), (0.0, 0));
+        let small = Image { width: 10, height: 10, pixels: vec![[0.0; 3]; 100] };
+        assert!(differentiator.gradient(&splats, &cameras[0], &small).is_err());
+        // Memory of one picture does not show in the next.
+        let fresh = Differentiator::default().gradient(&splats, &cameras[1], &targets[1]).unwrap();
+        assert_eq!(differentiator.gradient(&splats, &cameras[1], &targets[1]).unwrap(), fresh);
+    }
+}
