@@ -9,7 +9,7 @@ use lexisplat_render::{Camera, Renderer};
 
 use crate::effort::{REFINE, Refine};
 use crate::error::{Error, Result};
-use crate::packing_views::Looked;
+use crate::packing_views::{Looked, MOST_REFINED_PIXELS};
 use crate::solve::KEPT_BYTES;
 use crate::target::Target;
 use crate::views::Viewpoints;
@@ -19,6 +19,10 @@ use crate::views::Viewpoints;
 /// the file itself (docs/results/sizes.md).
 const MEMORY: u64 = 320_000_000 + KEPT_BYTES;
 const MEMORY_PER_TEN_BYTES: u64 = 26;
+/// The same for refining: more bytes, for the pictures that are fitted to, and bytes for each ten bytes of the source if all
+/// Gaussians stay. The PLY of 99 MB took 1,440 MB.
+const REFINING_MEMORY: u64 = 3 * MOST_REFINED_PIXELS;
+const REFINING_PER_TEN_BYTES: u64 = 85;
 /// Default of the program and of the Python package for the memory that packing a whole scene may take, in bytes.
 pub const DEFAULT_MEMORY: u64 = 4 << 30;
 /// Largest number of Gaussians of a scene without cameras that is packed whole. The views of a larger scene show each Gaussian too
@@ -239,8 +243,12 @@ impl Packing {
     /// # Errors
     /// [`Error::Memory`] if a choice needs the whole scene and the memory allowed is too small.
     pub(crate) fn is_whole(&self, gaussians: u64, bytes: u64, cameras: bool) -> Result<bool> {
-        let grows = u128::from(bytes) * u128::from(MEMORY_PER_TEN_BYTES) / 10;
-        let needed = u64::try_from(grows).unwrap_or(u64::MAX).saturating_add(MEMORY);
+        let (fixed, per_ten_bytes) = match self.refine {
+            Some(_) => (MEMORY + REFINING_MEMORY, REFINING_PER_TEN_BYTES),
+            None => (MEMORY, MEMORY_PER_TEN_BYTES),
+        };
+        let grows = u128::from(bytes) * u128::from(per_ten_bytes) / 10;
+        let needed = u64::try_from(grows).unwrap_or(u64::MAX).saturating_add(fixed);
         let fits = needed <= self.memory;
         match self.needs_whole() {
             Some(choice) if !fits => Err(Error::Memory { choice, needed, allowed: self.memory }),
@@ -301,6 +309,8 @@ mod tests {
             let packing = packing.with_memory(bytes);
             assert!(matches!(packing.is_whole(large, bytes, false), Err(Error::Memory { .. })));
         }
+        let refined = Packing::default().with_refine(Refine::Quick).with_memory(8 * bytes);
+        assert!(matches!(refined.is_whole(large, bytes, true), Err(Error::Memory { choice: REFINE, .. })));
         assert!(matches!(Packing::default().is_whole(u64::MAX, u64::MAX, true), Ok(true)));
     }
 }

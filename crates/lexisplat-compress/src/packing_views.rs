@@ -49,7 +49,7 @@ const PART_FITTED_SHARE: u64 = 4;
 /// Number of pixels that are fitted to in a round of all views, and number of pixels in all. Rounds draw other squares than the
 /// round before. With the same squares in each round, files of room-large were 8 % larger (docs/METHOD.md, "Refining").
 const REFINED_PIXELS: u64 = 24_000_000;
-const MOST_REFINED_PIXELS: u64 = 96_000_000;
+pub(crate) const MOST_REFINED_PIXELS: u64 = 96_000_000;
 /// Every `MEASURED_HALVED`-th view that measures is also drawn at half its size. Every `FITTED_HALVED`-th view for fitting
 /// is at half its size instead. Otherwise errors that are even over many pixels count for too little, and show when
 /// pictures are drawn smaller (docs/METHOD.md, "How sharp").

@@ -74,11 +74,11 @@ fn files_and_memory_are_the_same_as_source_and_sink() {
 /// threads.
 #[test]
 fn refined_files_are_smaller() {
-    let splats = scene(&SampleOptions::new(200, 0));
-    let packing = |quality: Quality| Packing::new(quality).with_cameras(orbit(&splats.geometry, 8, 64, 48));
+    let splats = scene(&SampleOptions::new(300, 0));
+    let packing = |quality: Quality| Packing::new(quality).with_cameras(orbit(&splats.geometry, 16, 64, 48));
     let target = Quality::from(Target::MeanPsnr(30.0));
     let (_, plain) = run(packing(target), &splats);
-    let (file, report) = run(packing(target).with_refine(Refine::Minutes(0.04)), &splats);
+    let (file, report) = run(packing(target).with_refine(Refine::Minutes(0.05)), &splats);
     let refined = report.refined.unwrap();
     assert!(refined.gaussians < plain.gaussians && report.gaussians <= refined.gaussians, "{refined:?}");
     assert!(refined.after_psnr > refined.before_psnr && refined.steps > 10, "{refined:?}");
