@@ -84,10 +84,10 @@ pub(crate) struct Compress {
     /// original scene [default: no limit].
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) max_gaussians: Option<usize>,
-    /// Remove more Gaussians, and fit the others to pictures of the scene: positions, shapes, colours and opacities. With
-    /// cameras the file is smaller at the same quality and draws faster; without cameras little is gained. `quick` and `thorough` are numbers of steps; MINUTES is
-    /// about the time on one thread, such as 5. The scene is held in memory as a whole [default when the option is
-    /// given without a value: quick].
+    /// Remove more Gaussians, and fit the others to pictures of the scene: positions, shapes, colours and opacities.
+    /// With cameras the file is smaller at the same quality and draws faster; without cameras little is gained.
+    /// `quick` and `thorough` are numbers of steps; MINUTES is about the time on one thread, such as 5. The scene is
+    /// held in memory as a whole [default when the option is given without a value: quick].
     #[arg(long, value_name = "quick|thorough|MINUTES", num_args = 0..=1, default_missing_value = "quick", conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) refine: Option<Refine>,
     /// Largest error of each Gaussian's SH vector, above 0, such as 0.05: the L2 norm of the difference, not squared.
