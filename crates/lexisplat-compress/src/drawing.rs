@@ -57,15 +57,31 @@ pub fn draw_views(
     options: &DrawOptions,
     progress: &dyn Progress,
 ) -> Result<Vec<Image>> {
+    draw_each(renderer, scene, cameras, options, |image| image, progress)
+}
+
+/// Draws `scene` from every camera as [`draw_views`] does. Returns the result of `with` for each picture, so that not all
+/// pictures need memory at once.
+///
+/// # Errors
+/// As [`draw_views`].
+pub(crate) fn draw_each<T>(
+    renderer: &mut Renderer,
+    scene: &Scene<'_>,
+    cameras: &[Camera],
+    options: &DrawOptions,
+    with: impl Fn(Image) -> T,
+    progress: &dyn Progress,
+) -> Result<Vec<T>> {
     let prepared = renderer.prepare(*scene)?;
     progress.begin(Stage::Draw, cameras.len() as u64);
     let mut draw = |camera| {
         progress.check()?;
-        let image = options.draw(renderer, &prepared, camera);
+        let image = options.draw(renderer, &prepared, camera)?;
         progress.advance(1);
-        image
+        Ok(with(image))
     };
-    let images = cameras.iter().map(&mut draw).collect();
+    let drawn = cameras.iter().map(&mut draw).collect();
     progress.end();
-    images
+    drawn
 }

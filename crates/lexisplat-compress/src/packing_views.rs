@@ -65,7 +65,7 @@ const JUDGE_SHARE: usize = 2;
 const REFINED_JUDGE_SHARE: usize = 3;
 const REFINED_JUDGES: usize = 12;
 /// Views between given cameras to which everything is fitted: the neighbour of each camera, from the nearest, and the share
-/// of the way to it. Cameras that judge have such views too: without those room takes 6 % more bytes, and judges show no less
+/// of the way to it. Cameras that judge have such views too: without these views room takes 6 % more bytes, and judges show no less
 /// than test views. Without any the fit suits the cameras, and views between these are up to 6 dB worse (docs/METHOD.md).
 const REFINED_BETWEEN: [(usize, f64); 2] = [(0, 0.4), (2, 0.5)];
 /// Most found views to which everything is fitted beside given cameras. Without them and views beside the cameras room takes

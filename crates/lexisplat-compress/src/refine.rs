@@ -1,15 +1,14 @@
 //! Fits the Gaussians that stay to the pictures of the original: positions, shapes, opacities and colours.
 //!
 //! Fewer Gaussians then show what all of them showed. The steps are those of Adam (Kingma and Ba, "Adam: a method for
-//! stochastic optimization", 2015), one view a step. The sizes of steps are in the proportions of 3DGS training (INRIA
-//! `arguments/__init__.py`). A Gaussian moves only in steps whose view shows it (docs/METHOD.md, "Refining").
+//! stochastic optimization", 2015), one view a step. A Gaussian moves only in steps whose view shows it (docs/METHOD.md, "Refining").
 
 use lexisplat::sh::rest_basis;
 use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, Differentiator, GaussianGradient, Image, PictureGradient, Renderer, Scene};
 use rayon::prelude::*;
 
-use crate::drawing::DrawOptions;
+use crate::drawing::{DrawOptions, draw_each};
 use crate::effort::{Refine, RefineSteps};
 use crate::error::Result;
 
@@ -20,7 +19,8 @@ const SECOND: f32 = 0.99;
 /// Added to roots of averages, so that divisions are finite.
 const TINY: f32 = 1e-15;
 /// Sizes of the first steps: of positions as a share of the [extent](extent) of the cameras, of the logarithms of scales, of
-/// quaternions, of the logits of opacities, and of SH coefficients.
+/// quaternions, of the logits of opacities, and of SH coefficients. They come from those of 3DGS training (INRIA
+/// `arguments/__init__.py`) and were tuned on bonsai-3dgs (docs/METHOD.md, "Refining").
 const POSITION: f32 = 1.5e-5;
 const SCALES: f32 = 1.25e-2;
 const ROTATION: f32 = 2.5e-3;
@@ -97,15 +97,8 @@ impl Refining {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
-        let scene = cpu.prepare(Scene::from(splats))?;
-        progress.begin(Stage::Draw, cameras.len() as u64);
-        let mut targets = Vec::with_capacity(cameras.len());
-        for camera in &cameras {
-            progress.check()?;
-            targets.push(options.draw(&mut cpu, &scene, camera)?.to_8bit());
-            progress.advance(1);
-        }
-        progress.end();
+        let bytes = |image: Image| image.to_8bit();
+        let targets = draw_each(&mut cpu, &Scene::from(splats), &cameras, &options, bytes, progress)?;
         let pixels: usize = targets.iter().map(Vec::len).sum();
         let steps = effort.steps(pixels as f64 / targets.len().max(1) as f64, splats.len());
         Ok(Self { cameras, targets, steps })

@@ -33,14 +33,13 @@ pub(crate) fn sampled(cameras: Vec<Camera>, pixels: u64) -> Vec<Camera> {
 /// every square once.
 pub(crate) fn sampled_again(cameras: Vec<Camera>, pixels: u64, most: u64) -> Vec<Camera> {
     let all: u64 = cameras.iter().map(Camera::drawn_pixels).sum();
-    let times = (most.min(all) as f64 / pixels.max(1) as f64).round();
+    let rounds = (most.min(all) + pixels / 2) / pixels.max(1);
     let mut some = sampled(cameras.clone(), pixels);
-    let share = pixels as f64 / all.max(1) as f64;
-    let mut from = share;
-    while from < (times - 0.5) * share {
-        let squares = |(k, camera): (usize, &Camera)| squares_of(camera.clone(), from..=from + share, k);
+    let share = |round: u64| (pixels * round) as f64 / all as f64;
+    for round in 1..rounds {
+        let phases = share(round)..=share(round + 1);
+        let squares = |(k, camera): (usize, &Camera)| squares_of(camera.clone(), phases.clone(), k);
         some.extend(cameras.iter().enumerate().map(squares));
-        from += share;
     }
     some
 }

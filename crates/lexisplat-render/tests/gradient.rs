@@ -93,3 +93,19 @@ fn the_gradient_is_the_slope_of_the_twin() {
         }
     }
 }
+
+#[test]
+fn a_picture_like_its_target_has_no_gradient_and_sizes_must_agree() {
+    let (splats, views) = sample(false);
+    let (camera, _) = &views[0];
+    let own = render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
+    let mut differentiator = Differentiator::default();
+    let found = differentiator.gradient(&splats, camera, &own).unwrap();
+    assert_eq!((found.loss, found.gaussians.len()), (0.0, 0));
+    let small = Image { width: 10, height: 10, pixels: vec![[0.0; 3]; 100] };
+    assert!(differentiator.gradient(&splats, camera, &small).is_err());
+    // Memory of one picture does not show in the next.
+    let (camera, target) = &views[1];
+    let fresh = Differentiator::default().gradient(&splats, camera, target).unwrap();
+    assert_eq!(differentiator.gradient(&splats, camera, target).unwrap(), fresh);
+}

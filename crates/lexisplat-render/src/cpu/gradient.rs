@@ -20,7 +20,8 @@ use super::tiles::List;
 use super::to_world::{OnScreen, ToWorld};
 use super::workspace::Workspace;
 
-/// The derivatives of the squared errors of one picture by the values of one Gaussian, in the units of [`Geometry`](lexisplat::Geometry).
+/// The derivatives of the squared errors of one picture by the values of one Gaussian, in the units of
+/// [`Geometry`](lexisplat::Geometry).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct GaussianGradient {
     /// By the position.
@@ -33,7 +34,8 @@ pub struct GaussianGradient {
     pub opacity: f32,
     /// By the base colour.
     pub dc: [f32; 3],
-    /// By the colour towards the camera. The derivative by coefficient k of a channel's SH-rest is the k-th basis value times this.
+    /// By the colour towards the camera. The derivative by coefficient k of a channel's SH-rest is the k-th basis value times
+    /// this.
     pub colour: [f32; 3],
     /// The unit vector from the camera to the Gaussian.
     pub direction: [f32; 3],
@@ -134,7 +136,7 @@ impl Differentiator {
             .map(|splat| {
                 let i = splat.gaussian as usize;
                 let on_screen = OnScreen::of(splat, sums[i].map(|sum| factor * sum));
-                world.carry(&splats.geometry, splats.degree, rest_of(splats, i), i, splat, &on_screen)
+                world.carry(&splats.geometry, splats.degree, splats.rest(i), i, splat, &on_screen)
             })
             .collect();
         let gaussians: Vec<u32> = shown.iter().map(|splat| splat.gaussian).collect();
@@ -143,12 +145,6 @@ impl Differentiator {
         }
         Ok(PictureGradient { loss, gaussians, rows })
     }
-}
-
-/// Returns the SH-rest of Gaussian `i`.
-fn rest_of(splats: &Splats, i: usize) -> &[f32] {
-    let dim = splats.degree.rest();
-    &splats.sh_rest[i * dim..(i + 1) * dim]
 }
 
 /// Returns a number of a Gaussian, of which there are fewer than 2^32.
@@ -191,56 +187,5 @@ fn add(
         each([&gx, &gy, x, y], |[gx, gy, x, y]| [gx * (px - x), gx * (py - y), gy * (py - y)]);
     for (sum, own) in sums[OF_OPACITY..].iter_mut().zip([&g, &gx, &gy, &gxx, &gxy, &gyy]) {
         [*sum] = each([&*sum, own], |[sum, own]| [sum + own]);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use lexisplat_sample::{SampleOptions, scene};
-
-    use super::*;
-    use crate::cpu::{RenderOptions, render};
-    use crate::orbit::orbit;
-
-    /// A few large, soft Gaussians that all lie within the picture, and a target that is darker everywhere.
-    fn sample(antialiased: bool) -> (Splats, Vec<Camera>, Vec<Image>) {
-        let mut splats = scene(&SampleOptions::new(12, 3));
-        splats.meta.antialiased = antialiased;
-        for i in 0..splats.len() {
-            let g = &mut splats.geometry;
-            let k = i as f32;
-            g.positions[i] = [0.3 * (1.7 * k).sin(), 0.3 * (2.9 * k).cos(), 0.3 * (0.9 * k).sin()];
-            g.scales[i] = [-1.6, -2.1 + 0.3 * k.sin(), -2.9 + 0.2 * k.cos()];
-            g.opacities[i] = 1.0 + 0.6 * (1.3 * k).sin();
-            g.dc[i] = g.dc[i].map(|v| 0.3 * v.tanh());
-        }
-        for v in &mut splats.sh_rest {
-            *v = 0.1 * v.tanh();
-        }
-        let cameras = orbit(&splats.geometry, 2, 140, 100);
-        let picture = |camera| render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
-        let targets = cameras.iter().map(picture).map(|mut image: Image| {
-            for (k, pixel) in image.pixels.iter_mut().enumerate() {
-                let (x, y) = ((k % 140) as f32 / 140.0, (k / 140) as f32 / 100.0);
-                *pixel = pixel.map(|v| v * (0.1 + 0.4 * x + 0.4 * y));
-            }
-            image
-        });
-        let targets = targets.collect();
-        (splats, cameras, targets)
-    }
-
-    #[test]
-    fn a_picture_like_its_target_has_no_gradient_and_sizes_must_agree() {
-        let (splats, cameras, targets) = sample(false);
-        let own = render(&Scene::from(&splats), &cameras[0], &RenderOptions::default()).unwrap();
-        let mut differentiator = Differentiator::default();
-        let found = differentiator.gradient(&splats, &cameras[0], &own).unwrap();
-        assert_eq!((found.loss, found.gaussians.len()), (0.0, 0));
-        let small = Image { width: 10, height: 10, pixels: vec![[0.0; 3]; 100] };
-        assert!(differentiator.gradient(&splats, &cameras[0], &small).is_err());
-        // Memory of one picture does not show in the next.
-        let fresh = Differentiator::default().gradient(&splats, &cameras[1], &targets[1]).unwrap();
-        assert_eq!(differentiator.gradient(&splats, &cameras[1], &targets[1]).unwrap(), fresh);
     }
 }
