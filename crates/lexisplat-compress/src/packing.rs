@@ -22,7 +22,7 @@ const MEMORY_PER_TEN_BYTES: u64 = 26;
 /// The same for refining: more bytes, for the pictures that are fitted to, and bytes for each ten bytes of the source if all
 /// Gaussians stay. The PLY of 99 MB took 1,440 MB.
 const REFINING_MEMORY: u64 = 3 * MOST_REFINED_PIXELS;
-const REFINING_PER_TEN_BYTES: u64 = 85;
+const REFINING_PER_TEN_BYTES: u64 = 88;
 /// Default of the program and of the Python package for the memory that packing a whole scene may take, in bytes.
 pub const DEFAULT_MEMORY: u64 = 4 << 30;
 /// Largest number of Gaussians of a scene without cameras that is packed whole. The views of a larger scene show each Gaussian too

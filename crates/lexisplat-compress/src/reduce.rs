@@ -13,11 +13,13 @@ use crate::report::RefineReport;
 use crate::target::Target;
 
 /// Amounts by which the quality of the Gaussians that stay may fall short of the quality asked for before they are refined,
-/// in dB. After a fit that gains too little more Gaussians stay, by the next amount.
-const BELOW: [f64; 3] = [1.0, -2.5, -6.0];
+/// in dB, with given cameras and with found views. After a fit that gains too little more Gaussians stay, by the next amount.
+/// Fits gain less in found views, which show more.
+const BELOW_GIVEN: [f64; 3] = [2.0, -1.0, -6.0];
+const BELOW_FOUND: [f64; 2] = [-3.0, -6.0];
 /// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
 /// it needs so fine steps that the file becomes larger (docs/METHOD.md, "Refining").
-const ABOVE: f64 = 3.0;
+const ABOVE: f64 = 2.0;
 /// Bytes of a Gaussian in a refined file, from which a size gives the number of Gaussians.
 const BYTES_EACH: f64 = 10.5;
 /// Quality at which short rows of SH-rest pay if the target is a size, in dB.
@@ -57,7 +59,8 @@ impl Packing {
             Quality::Preset(preset) => (preset.decibels(), false),
         };
         let value = |score: Score| Ok::<_, Error>(if least { score.least } else { score.judged });
-        let mut tries = BELOW.into_iter();
+        let below = if judge.views_are_given() { &BELOW_GIVEN[..] } else { &BELOW_FOUND };
+        let mut tries = below.iter();
         loop {
             let below = tries.next();
             let made = match below {
@@ -85,13 +88,20 @@ impl Packing {
     ) -> Result<(Splats, Sensitivity, RefineReport)> {
         let progress = removal.progress;
         let RefineSteps { all, .. } = refining.steps;
-        let before = judge.score(&splats, progress)?.judged;
-        let step = Packer::new(&splats, &sensitivity, &self.options)?.step_for(decibels);
+        let before = judge.score(&splats, progress)?;
+        // The step is that of all pictures, and with found views only the hardest of them judge.
+        let all_pictures = decibels + before.mean - before.judged;
+        let step = Packer::new(&splats, &sensitivity, &self.options)?.step_for(all_pictures);
         let cost = RestCost::new(sensitivity.colour.iter().copied(), step);
-        refining.refine(&mut splats, Free::All, all, &cost, progress)?;
+        let shares = refining.shares(&splats, &sensitivity, before.mean);
+        refining.refine(&mut splats, Free::All, all, &cost, Some(&shares), progress)?;
         let after = judge.score(&splats, progress)?.judged;
-        let report =
-            RefineReport { steps: all, gaussians: splats.len(), before_psnr: before, after_psnr: after };
+        let report = RefineReport {
+            steps: all,
+            gaussians: splats.len(),
+            before_psnr: before.judged,
+            after_psnr: after,
+        };
         let sensitivity = removal.views.sensitivity(removal.renderer, &splats, progress)?;
         Ok((splats, sensitivity, report))
     }

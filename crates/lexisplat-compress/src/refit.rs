@@ -189,14 +189,14 @@ fn refined<'a>(
 ) -> Result<Refitted<'a>> {
     let RefineSteps { radiance, appearance, .. } = refining.steps;
     let cost = RestCost::new(quantised.sensitivities().iter().map(|s| s.colour), step);
-    refining.refine(&mut model, Free::Radiance, radiance, &cost, progress)?;
+    refining.refine(&mut model, Free::Radiance, radiance, &cost, None, progress)?;
     let again = quantised.with_sh_rest(&model.sh_rest, progress)?;
     let shown = appearances(&model.geometry);
     let mut model = again.finish(Some(&shown), None, progress)?.0.unpack()?.into_splats();
     for (i, shown) in shown.into_iter().enumerate() {
         shown.give(&mut model.geometry, i);
     }
-    refining.refine(&mut model, Free::Appearance, appearance, &cost, progress)?;
+    refining.refine(&mut model, Free::Appearance, appearance, &cost, None, progress)?;
     let shown = appearances(&model.geometry);
     let file = again.finish(Some(&shown), None, progress)?;
     Ok(Refitted { shown: Some(shown), again: Some(again), file })

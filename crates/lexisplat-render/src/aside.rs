@@ -1,4 +1,4 @@
-//! Views beside given cameras, for measuring the sensitivity there.
+//! Views beside other views.
 //!
 //! People look at a scene from places beside its cameras too: from nearer, from further away and from the side.
 
@@ -13,10 +13,18 @@ const MIDDLE: f32 = 0.15;
 /// Largest weight of one Gaussian in the middle of a picture, as a share of the squared distance. Without this limit a
 /// near Gaussian would cover the whole middle.
 const LARGEST: f64 = 0.1;
-/// Largest angle of a move around the subject, in radians: 60 degrees.
-const TURN: f64 = std::f64::consts::FRAC_PI_3;
-/// Smallest and largest distance of a moved camera from the subject, in distances of the given camera.
-const DISTANCES: [f64; 2] = [0.3, 2.0];
+/// Limits of a move around the subject.
+struct Move {
+    /// Largest angle, in radians.
+    turn: f64,
+    /// Smallest and largest distance of the moved camera from the subject, in distances of the camera itself.
+    distances: [f64; 2],
+}
+
+/// Moves of [`aside`].
+const FAR: Move = Move { turn: std::f64::consts::FRAC_PI_3, distances: [0.3, 2.0] };
+/// Moves of [`nearby`].
+const NEAR: Move = Move { turn: std::f64::consts::FRAC_PI_3 / 3.0, distances: [0.77, 1.3] };
 
 /// Returns at most `count` cameras beside `cameras`. Evenly chosen cameras are moved around their subject, and towards it
 /// or away from it. They keep the size of their pictures and their name. Cameras that look at nothing are skipped. The
@@ -26,26 +34,43 @@ pub fn aside(geometry: &Geometry, cameras: &[Camera], count: usize) -> Vec<Camer
     let stride = cameras.len().div_ceil(count.max(1)).max(1);
     let some = cameras.iter().skip(stride / 2).step_by(stride).take(count).enumerate();
     some.filter_map(|(number, camera)| {
-        let moved = moved(camera, subject_distance(camera, geometry)?, number);
+        let moved = moved(camera, subject_distance(camera, geometry)?, number, &FAR);
         // A camera far out may be moved beyond the range of `f32`.
         moved.validate().is_ok().then_some(moved)
     })
     .collect()
 }
 
+/// Returns `rounds` times a camera near each of `cameras`: moved by up to 20 degrees around its subject, to 0.77 to 1.3 times the
+/// distance, each time to another place. They keep the size of their pictures and their name. Cameras that look at nothing are
+/// skipped. The same input gives the same cameras.
+#[must_use]
+pub fn nearby(geometry: &Geometry, cameras: &[Camera], rounds: usize) -> Vec<Vec<Camera>> {
+    let distances: Vec<Option<f64>> =
+        cameras.iter().map(|camera| subject_distance(camera, geometry)).collect();
+    let round = |round: usize| {
+        let all = cameras.iter().zip(&distances).enumerate();
+        let near = all.filter_map(|(k, (camera, distance))| {
+            Some(moved(camera, (*distance)?, round * cameras.len() + k, &NEAR))
+        });
+        near.filter(|camera| camera.validate().is_ok()).collect()
+    };
+    (0..rounds).map(round).collect()
+}
+
 /// Returns the `number`-th moved camera, from a camera whose subject is at `distance`.
-fn moved(camera: &Camera, distance: f64, number: usize) -> Camera {
+fn moved(camera: &Camera, distance: f64, number: usize, Move { turn, distances }: &Move) -> Camera {
     let spread = |k: usize| ((number as f64 + 0.5) * PLASTIC[k]).fract();
     let [right, down, forward] =
         [0, 1, 2].map(|k| DVec3::from_array(camera.rotation.map(|row| f64::from(row[k]))));
     // The camera turns towards a direction across the line of sight. The axis perpendicular to both stays fixed.
     let (sine, cosine) = libm::sincos(std::f64::consts::TAU * spread(0));
     let [towards, level] = [cosine * right + sine * down, cosine * down - sine * right];
-    let (turn_sine, turn_cosine) = libm::sincos(TURN * libm::sqrt(spread(1)));
+    let (turn_sine, turn_cosine) = libm::sincos(turn * libm::sqrt(spread(1)));
     let new_forward = turn_cosine * forward + turn_sine * towards;
     let new_towards = turn_cosine * towards - turn_sine * forward;
     let axes = [cosine * new_towards - sine * level, sine * new_towards + cosine * level, new_forward];
-    let [near, far] = DISTANCES.map(libm::log);
+    let [near, far] = distances.map(libm::log);
     let subject = DVec3::from_array(camera.position.map(f64::from)) + distance * forward;
     let position = subject - distance * libm::exp(near + spread(2) * (far - near)) * new_forward;
     let rotation = std::array::from_fn(|row| axes.map(|axis| axis[row]));
@@ -130,6 +155,25 @@ mod tests {
         assert!(nearest < 0.5 && farthest > 1.3, "{nearest} {farthest}");
         assert_eq!(views, aside(&geometry, &cameras, 10));
         assert_eq!(aside(&geometry, &cameras[..2], 10).len(), 2);
+    }
+
+    #[test]
+    fn views_nearby_are_in_other_places_each_round() {
+        let geometry = ball();
+        let cameras = orbit(&geometry, 12, 90, 60);
+        let rounds = nearby(&geometry, &cameras, 3);
+        assert_eq!(rounds.iter().map(Vec::len).collect::<Vec<_>>(), [12; 3]);
+        for (k, of) in cameras.iter().enumerate() {
+            let distance = subject_distance(of, &geometry).unwrap();
+            for view in rounds.iter().map(|round| &round[k]) {
+                view.validate().unwrap();
+                let moved = (0..3).map(|i| (view.position[i] - of.position[i]).powi(2)).sum::<f32>().sqrt();
+                // 20 degrees at 1.3 times the distance.
+                assert!(moved > 0.0 && f64::from(moved) < 0.6 * distance, "{moved} {distance}");
+            }
+            assert!(rounds[0][k].position != rounds[1][k].position);
+        }
+        assert!(nearby(&Geometry::default(), &cameras, 2).iter().all(Vec::is_empty));
     }
 
     #[test]

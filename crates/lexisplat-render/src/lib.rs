@@ -80,7 +80,7 @@ mod view_set;
 #[cfg(any(feature = "gpu", not(target_family = "wasm")))]
 mod wait;
 
-pub use aside::aside;
+pub use aside::{aside, nearby};
 pub use between::between;
 pub use bulk::bulk;
 pub use camera::{Camera, MAX_SIDE, Split};
