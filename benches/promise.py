@@ -2,18 +2,18 @@
 """The quality asked for beside the quality reached over views that were not there when a file was made.
 
     python3 benches/promise.py FOLDER [FOLDER ...] [--only NAME ...] [--asked 36 40 44] [--presets] [--guess]
-        [--binary LEXISPLAT] [--json FILE]
+        [--refine quick|thorough] [--binary LEXISPLAT] [--json FILE]
 
 Every binary float PLY of the folders that has a `NAME.cameras.json` (NAME may be a prefix of the PLY's name), and
 every PLY below 8000 Gaussians over an orbit, is compressed with `--psnr` to each asked quality: without cameras, and
 with its training cameras where it has cameras. `--presets` adds the presets, whose aims are 35, 40, 45 and 54 dB, and
-`--guess` the presets of `--guess`.
+`--guess` the presets of `--guess`. `--refine` adds the same qualities with `compress --refine`.
 
 The example `promise` of lexisplat-eval then scores each file against the original; see there for what views, pictures
 and tiles are. Pictures are as wide as the cameras' own, which the model was trained at, 1,600 pixels at most, unless
 TRAINED says otherwise; on the path they are drawn at half that width too, and 400 pixels wide. The last columns compare
-sizes at equal reached quality: bytes without cameras over bytes with, or of a guess over bytes without cameras, by the
-straight line between the logarithms of the bytes of neighbouring files.
+sizes at equal reached quality: bytes without cameras over bytes with, of a guess over bytes without cameras, or of a
+refined file over bytes without refining, by the straight line between the logarithms of the bytes of neighbouring files.
 """
 
 import argparse
@@ -81,6 +81,9 @@ def measure(binary, scorer, model, count, args):
     with tempfile.TemporaryDirectory() as folder:
         ways = [("none", ["--no-cameras"])] + ([("given", ["--cameras", training(cameras, folder)])] if cameras else [])
         jobs = [(way, f"psnr {a:g}", a, [*extra, "--psnr", f"{a:g}"]) for way, extra in ways for a in args.asked]
+        if args.refine:
+            refined = [(f"{way}, {args.refine}", [*extra, "--refine", args.refine]) for way, extra in ways]
+            jobs += [(way, f"psnr {a:g}", a, [*extra, "--psnr", f"{a:g}"]) for way, extra in refined for a in args.asked]
         if args.presets:
             jobs += [(way, name, aim, [*extra, "--preset", name]) for way, extra in ways for name, aim in PRESETS.items()]
         if args.guess:
@@ -127,7 +130,8 @@ def table(rows):
         path = r["path"]
         off = [f"{r[k]['mean']:.1f}" if r[k] else "-" for k in KINDS]
         ratio = ""
-        beside = (r["scene"], {"none": "given", "guess": "none"}.get(r["cameras"]))
+        way, refined, _ = r["cameras"].partition(",")
+        beside = (r["scene"], way if refined else {"none": "given", "guess": "none"}.get(way))
         if beside in points:
             other = bytes_at(points[beside], path["mean"])
             ratio = f"{r['bytes'] / other:.2f}" if other else ""
@@ -143,6 +147,7 @@ def main():
     parser.add_argument("--asked", nargs="+", type=float, default=[36, 40, 44])
     parser.add_argument("--presets", action="store_true")
     parser.add_argument("--guess", action="store_true")
+    parser.add_argument("--refine")
     parser.add_argument("--binary", type=Path)
     parser.add_argument("--json", type=Path)
     parser.set_defaults(failed=False)

@@ -38,13 +38,16 @@ class Bench:
     def __init__(self, args, scratch):
         self.args, self.scratch = args, scratch
 
+    def views(self, cameras):
+        return ["--cameras", cameras, "--split", "test", "--width", WIDTH, "--device", "cpu", "--json"]
+
     def made(self, model, cameras, asked, used, *options):
         """Facts of a file of `model`."""
         file = self.scratch / "made.lexi"
         looks = ["--cameras", cameras] if used else ["--no-cameras"]
         told, seconds = run(self.args.binary, "compress", model, "-o", file, "--psnr", asked, *looks, *options,
                             "--device", "cpu", "--overwrite", "--json")
-        views = ["--cameras", cameras, "--split", "test", "--width", WIDTH, "--device", "cpu", "--json"]
+        views = self.views(cameras)
         score = json.loads(run(self.args.binary, "compare", model, file, *views)[0])
         beside = json.loads(run(self.args.binary, "compare", model, file, "--orbit", 24, "--device", "cpu", "--json")[0])
         told = json.loads(told)
@@ -52,10 +55,10 @@ class Bench:
                 "psnr": score["psnr"]["mean"], "least": score["psnr"]["min"], "beside": beside["psnr"]["mean"],
                 "seconds": seconds, "frame": self.frame(file, views), "refined": told["refined"]}
 
-    def frame(self, file, views):
-        """Median seconds of a frame of the processor's renderer."""
+    def frame(self, file, views, path="cpu-sparse"):
+        """Median milliseconds of a frame of the processor's renderer."""
         found = json.loads(run(self.args.binary, "bench", file, *views, "--cpu-repeat", 3)[0])
-        return next(path["frame"]["median"] for path in found["paths"] if path["path"] == "cpu-sparse")
+        return next(each["frame"]["median"] for each in found["paths"] if each["path"] == path)
 
 
 def at(rows, psnr, key):
@@ -77,23 +80,24 @@ def main():
     if args.binary is None:
         subprocess.run(["cargo", "build", "--release", "-q", "-p", "lexisplat-cli"], cwd=ROOT, check=True)
         args.binary = ROOT / "target/release/lexisplat"
-    print("| model, PSNR asked | effort | bytes | test PSNR: mean, least | bytes without refining at this PSNR | ratio of bytes "
-          "| Gaussians left | without refining | frame, ms | without refining | found views, mean PSNR | without refining | CPU s |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
+    print("| model, PSNR asked | effort | bytes | test PSNR: mean, least | least without refining | bytes without refining "
+          "| ratio of bytes | Gaussians left | without refining | frame, ms | without refining | original | found views, mean PSNR | without refining | CPU s |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as scratch:
         bench = Bench(args, Path(scratch))
         for name in args.models:
             model = args.folder / f"{name}.ply"
             cameras = args.folder / f"{CAMERAS.get(name, name)}.cameras.json"
+            original = bench.frame(model, bench.views(cameras), "cpu-dense")
             for asked in args.asked:
                 used = not args.without_cameras
                 plain = [bench.made(model, cameras, asked + more, used) for more in BESIDE]
                 for effort in args.efforts:
                     row = bench.made(model, cameras, asked, used, "--refine", effort)
-                    same = {key: at(plain, row["psnr"], key) for key in ("bytes", "gaussians", "frame", "beside")}
+                    same = {key: at(plain, row["psnr"], key) for key in ("bytes", "gaussians", "frame", "beside", "least")}
                     print(f"| {name}, {asked:.0f} | {effort} | {row['bytes']:,} | {row['psnr']:.2f}, {row['least']:.2f} "
-                          f"| {same['bytes']:,.0f} | {row['bytes'] / same['bytes']:.2f} | {row['gaussians'] / row['of']:.2f} "
-                          f"| {same['gaussians'] / row['of']:.2f} | {row['frame']:.1f} | {same['frame']:.1f} "
+                          f"| {same['least']:.2f} | {same['bytes']:,.0f} | {row['bytes'] / same['bytes']:.2f} | {row['gaussians'] / row['of']:.2f} "
+                          f"| {same['gaussians'] / row['of']:.2f} | {row['frame']:.1f} | {same['frame']:.1f} | {original:.1f} "
                           f"| {row['beside']:.2f} | {same['beside']:.2f} | {row['seconds']:.0f} |", flush=True)
 
 

@@ -218,13 +218,15 @@ impl Packing {
         };
         let packer = Packer::new(packed_scene, &sensitivity, &options)?;
         drop(sensitivity);
+        let is_refined = refined.is_some();
         let refitting = Refitting::new(packer, fit).refining(refining);
         let (packed, report, judge, score) = match self.quality {
             Quality::Preset(preset) => {
                 // A preset cannot make up for Gaussians that a limit removes, so it is judged against the reduced scene.
                 let judges = views.some_judging(PRESET_JUDGES);
                 let judged_by = if most.is_some() { packed_scene } else { &splats };
-                let mut judge = Judge::new(renderer, judged_by, &judges, given, progress)?;
+                let judge = Judge::new(renderer, judged_by, &judges, given, progress)?;
+                let mut judge = judge.of_refined(is_refined);
                 let (packed, report, mut score) = pack_to_preset(&refitting, &mut judge, preset, progress)?;
                 if most.is_some() {
                     judge = judge.against(&splats, progress)?;
@@ -234,7 +236,8 @@ impl Packing {
             }
             Quality::Target(target) => {
                 let judges = views.some_judging(usize::MAX);
-                let mut judge = Judge::new(renderer, &splats, &judges, given, progress)?;
+                let judge = Judge::new(renderer, &splats, &judges, given, progress)?;
+                let mut judge = judge.of_refined(is_refined);
                 let bytes = source.source_bytes();
                 let (packed, report, score) =
                     pack_to_target(&refitting, &mut judge, target, bytes, progress)?;
