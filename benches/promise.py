@@ -80,10 +80,8 @@ def measure(binary, scorer, model, count, args):
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         ways = [("none", ["--no-cameras"])] + ([("given", ["--cameras", training(cameras, folder)])] if cameras else [])
-        jobs = [(way, f"psnr {a:g}", a, [*extra, "--psnr", f"{a:g}"]) for way, extra in ways for a in args.asked]
-        if args.refine:
-            refined = [(f"{way}, {args.refine}", [*extra, "--refine", args.refine]) for way, extra in ways]
-            jobs += [(way, f"psnr {a:g}", a, [*extra, "--psnr", f"{a:g}"]) for way, extra in refined for a in args.asked]
+        refined = [(f"{way}, {args.refine}", [*extra, "--refine", args.refine]) for way, extra in ways if args.refine]
+        jobs = [(way, f"psnr {a:g}", a, [*extra, "--psnr", f"{a:g}"]) for way, extra in ways + refined for a in args.asked]
         if args.presets:
             jobs += [(way, name, aim, [*extra, "--preset", name]) for way, extra in ways for name, aim in PRESETS.items()]
         if args.guess:

@@ -88,7 +88,8 @@ impl Judge {
         Ok(judge)
     }
 
-    /// Returns a judge of refined scenes. Given cameras then score as much less as they look better than other views.
+    /// Returns a judge of refined scenes. The judged quality over given cameras is then as much less as they look better than other
+    /// views.
     pub(crate) fn of_refined(self, refined: bool) -> Self {
         let better = if refined && self.given { NEAR_FITTED_DB } else { 0.0 };
         Self { better, ..self }
@@ -129,7 +130,7 @@ impl Judge {
             progress.check()?;
             let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
             let found = decibels(squared_error(original, &picture)?, *pixels);
-            all.push(found.map_or(IDENTICAL, |decibels| decibels.min(IDENTICAL)) - self.better);
+            all.push(found.map_or(IDENTICAL, |decibels| decibels.min(IDENTICAL)));
             progress.advance(1);
         }
         progress.end();
@@ -137,7 +138,7 @@ impl Judge {
         let mean = |views: &[f64]| views.iter().sum::<f64>() / views.len().max(1) as f64;
         let hard = if self.given { all.len() } else { all.len().div_ceil(HARD_PARTS) };
         let least = all.first().copied().unwrap_or(IDENTICAL);
-        Ok(Score { judged: mean(&all[..hard]), mean: mean(&all), least })
+        Ok(Score { judged: mean(&all[..hard]) - self.better, mean: mean(&all), least })
     }
 }
 
@@ -156,8 +157,8 @@ fn covered(camera: &Camera, black: &Image, white: &Image) -> u64 {
 /// PSNR over the views that judge, in dB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// The PSNR that photographs are expected to have on average: the mean over all views if the views were given,
-    /// otherwise the mean over the quarter of the views with the lowest PSNR.
+    /// The PSNR that photographs are expected to have on average: the mean over all views if the views were given, 0.3 dB less
+    /// if the scene was refined too; otherwise the mean over the quarter of the views with the lowest PSNR.
     pub judged: f64,
     /// The mean over all views.
     pub mean: f64,
@@ -186,7 +187,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn given_cameras_score_less_for_refined_scenes() {
+    fn given_cameras_judge_refined_scenes_to_be_worse() {
         let all = scene(&SampleOptions::new(300, 3));
         let mut some = all.clone();
         some.retain(&(0..300).map(|i| i % 3 > 0).collect::<Vec<_>>());
@@ -198,11 +199,9 @@ mod tests {
             judge.score(&some, &Silent).unwrap()
         };
         let (plain, refined) = (score(true, false), score(true, true));
-        for (plain, refined) in
-            [(plain.judged, refined.judged), (plain.mean, refined.mean), (plain.least, refined.least)]
-        {
-            assert!((plain - refined - NEAR_FITTED_DB).abs() < 1e-9, "{plain} {refined}");
-        }
+        assert!((plain.judged - refined.judged - NEAR_FITTED_DB).abs() < 1e-9, "{plain:?} {refined:?}");
+        // Files record the other two as they were measured.
+        assert_eq!((plain.mean, plain.least), (refined.mean, refined.least));
         assert_eq!(score(false, true), score(false, false));
     }
 }

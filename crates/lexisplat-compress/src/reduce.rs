@@ -59,8 +59,7 @@ impl Packing {
             Quality::Preset(preset) => (preset.decibels(), false),
         };
         let value = |score: Score| Ok::<_, Error>(if least { score.least } else { score.judged });
-        let below = if judge.views_are_given() { &BELOW_GIVEN[..] } else { &BELOW_FOUND };
-        let mut tries = below.iter();
+        let mut tries = if judge.views_are_given() { &BELOW_GIVEN[..] } else { &BELOW_FOUND }.iter();
         loop {
             let below = tries.next();
             let made = match below {

@@ -218,7 +218,6 @@ impl Packing {
         };
         let packer = Packer::new(packed_scene, &sensitivity, &options)?;
         drop(sensitivity);
-        let is_refined = refined.is_some();
         let refitting = Refitting::new(packer, fit).refining(refining);
         let (packed, report, judge, score) = match self.quality {
             Quality::Preset(preset) => {
@@ -226,7 +225,7 @@ impl Packing {
                 let judges = views.some_judging(PRESET_JUDGES);
                 let judged_by = if most.is_some() { packed_scene } else { &splats };
                 let judge = Judge::new(renderer, judged_by, &judges, given, progress)?;
-                let mut judge = judge.of_refined(is_refined);
+                let mut judge = judge.of_refined(refitting.refines());
                 let (packed, report, mut score) = pack_to_preset(&refitting, &mut judge, preset, progress)?;
                 if most.is_some() {
                     judge = judge.against(&splats, progress)?;
@@ -237,7 +236,7 @@ impl Packing {
             Quality::Target(target) => {
                 let judges = views.some_judging(usize::MAX);
                 let judge = Judge::new(renderer, &splats, &judges, given, progress)?;
-                let mut judge = judge.of_refined(is_refined);
+                let mut judge = judge.of_refined(refitting.refines());
                 let bytes = source.source_bytes();
                 let (packed, report, score) =
                     pack_to_target(&refitting, &mut judge, target, bytes, progress)?;
