@@ -1,21 +1,22 @@
-//! Removes Gaussians until their number is at most a limit.
+//! Removes and merges Gaussians until their number is at most a limit.
 
 use lexisplat::{Progress, Sensitivity, Splats, Stage};
 use lexisplat_render::{Renderer, Scene};
 
 use crate::error::Result;
+use crate::merge::lessened;
 use crate::only_cancels::OnlyCancels;
 use crate::packing_views::PackingViews;
 use crate::refit::Fit;
 
-/// Largest share of the Gaussians to remove before the sensitivity is measured again. A Gaussian shows more once its
+/// Largest share of the Gaussians by which there are fewer before the sensitivity is measured again. A Gaussian shows more once its
 /// neighbours are gone (docs/METHOD.md, "At most so many").
 const SHARE: f64 = 0.25;
 /// Quality of all Gaussians, in dB, from which the number is interpolated if the first removal goes too far. Identical
 /// pictures have no finite PSNR.
 const FIRST_DB: f64 = 60.0;
 
-/// Removes Gaussians, and fits base colours and opacities of the others.
+/// Removes and merges Gaussians, and fits base colours and opacities of the others.
 pub(crate) struct Removal<'a> {
     /// The views that measure.
     pub(crate) views: &'a PackingViews,
@@ -26,7 +27,7 @@ pub(crate) struct Removal<'a> {
 }
 
 impl Removal<'_> {
-    /// Returns at most `most` Gaussians of `splats`, those that show most, and their sensitivity. `sensitivity` is the
+    /// Makes at most `most` Gaussians of `splats`. Returns them and their sensitivity. `sensitivity` is the
     /// sensitivity of `splats`.
     ///
     /// # Errors
@@ -41,7 +42,8 @@ impl Removal<'_> {
         self.progress.begin(Stage::Look, (splats.len().saturating_sub(most)) as u64);
         let inner = &OnlyCancels(self.progress);
         while splats.len() > most {
-            let keep = all_but(share_of(&splats).min(splats.len() - most), &sensitivity.opacity);
+            let count = share_of(&splats).min(splats.len() - most);
+            let keep = lessened(&mut splats, &sensitivity, count);
             let before = splats.len();
             splats.retain(&keep);
             sensitivity.retain(&keep);
@@ -54,8 +56,8 @@ impl Removal<'_> {
         Ok((splats, sensitivity))
     }
 
-    /// Removes Gaussians of `splats` while the `quality` of the others is at least `decibels`, about. Returns the others and
-    /// their sensitivity, as [`Self::at_most`] does.
+    /// Makes `splats` fewer while their `quality` is at least `decibels`, about. Returns them and their sensitivity, as
+    /// [`Self::at_most`] does.
     ///
     /// # Errors
     /// As [`Self::at_most`], and errors of `quality`.
@@ -89,20 +91,10 @@ impl Removal<'_> {
     }
 }
 
-/// Returns the number of Gaussians that are removed at once.
+/// Returns by how many Gaussians there are fewer at once.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number")]
 fn share_of(splats: &Splats) -> usize {
     (splats.len() as f64 * SHARE).ceil() as usize
-}
-
-/// Returns a mark for each of `changes`: false for the `count` smallest, true for the others. Of equal changes the last are
-/// marked false first.
-fn all_but(count: usize, changes: &[f32]) -> Vec<bool> {
-    let mut order: Vec<usize> = (0..changes.len()).collect();
-    order.sort_by(|&a, &b| changes[a].total_cmp(&changes[b]).then(b.cmp(&a)));
-    let mut keep = vec![true; changes.len()];
-    order.iter().take(count).for_each(|&i| keep[i] = false);
-    keep
 }
 
 #[cfg(test)]
@@ -115,13 +107,6 @@ mod tests {
     use crate::{Judge, Looked};
 
     #[test]
-    fn the_smallest_go() {
-        assert_eq!(all_but(3, &[0.5, 0.1, 0.3, 0.1, 0.3]), [true, false, true, false, false]);
-        assert_eq!(all_but(1, &[0.0, 0.0]), [true, false]);
-        assert_eq!(all_but(0, &[0.0]), [true]);
-    }
-
-    #[test]
     fn what_stays_is_more_like_all_than_what_a_guess_leaves() {
         let all = scene(&SampleOptions::new(1000, 3));
         let mut cpu = Renderer::cpu();
@@ -132,7 +117,10 @@ mod tests {
         let made = removal.at_most(400, &all, sensitivity).unwrap();
         assert_eq!((made.0.len(), made.1.len()), (400, 400));
         let mut guessed = all.clone();
-        guessed.retain(&all_but(600, &Sensitivity::guess(&all.geometry).opacity));
+        let guess = Sensitivity::guess(&all.geometry).opacity;
+        let mut sorted = guess.clone();
+        sorted.sort_by(f32::total_cmp);
+        guessed.retain(&guess.iter().map(|own| *own >= sorted[600]).collect::<Vec<_>>());
         assert_eq!(guessed.len(), 400);
         let mut judge = Judge::new(cpu, &all, &views.some_judging(12), false, &Silent).unwrap();
         let [made, guessed] = [&made.0, &guessed].map(|scene| judge.score(scene, &Silent).unwrap().mean);

@@ -193,7 +193,7 @@ impl Packing {
         Self { looked: Some(looked), ..self }
     }
 
-    /// Removes the Gaussians that show least until there are at most `most`, 1 or more. A preset is then the quality
+    /// Removes and merges Gaussians, those that change pictures least, until there are at most `most`, 1 or more. A preset is then the quality
     /// relative to the reduced scene. A target in decibels is relative to the original scene.
     #[must_use]
     pub fn with_max_gaussians(self, most: impl Into<Option<usize>>) -> Self {

@@ -6,6 +6,7 @@ use lexisplat::{Sensitivity, Splats};
 use crate::effort::RefineSteps;
 use crate::error::{Error, Result};
 use crate::fewer::Removal;
+use crate::gain::Gain;
 use crate::judge::{Judge, Score};
 use crate::packing::{Packing, Quality};
 use crate::refine::{Free, Refining, RestCost};
@@ -15,8 +16,8 @@ use crate::target::Target;
 /// Amounts by which the quality of the Gaussians that stay may fall short of the quality asked for before they are refined,
 /// in dB, with given cameras and with found views. After a fit that gains too little more Gaussians stay, by the next amount.
 /// Fits gain less in found views, which show more.
-const BELOW_GIVEN: [f64; 3] = [2.0, -1.0, -6.0];
-const BELOW_FOUND: [f64; 2] = [-3.0, -6.0];
+const BELOW_GIVEN: [f64; 3] = [1.5, -1.5, -6.0];
+const BELOW_FOUND: [f64; 1] = [-5.0];
 /// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
 /// it needs so fine steps that the file becomes larger (docs/METHOD.md, "Refining").
 const ABOVE: f64 = 2.0;
@@ -25,10 +26,18 @@ const BYTES_EACH: f64 = 10.5;
 /// Quality at which short rows of SH-rest pay if the target is a size, in dB.
 const SIZE_DB: f64 = 40.0;
 
+/// A scene of fewer Gaussians, fitted to the pictures of all.
+pub(crate) struct Reduced {
+    pub(crate) splats: Splats,
+    pub(crate) sensitivity: Sensitivity,
+    pub(crate) report: RefineReport,
+    /// Score before quantisation.
+    pub(crate) score: Score,
+}
+
 impl Packing {
-    /// Removes Gaussians of `splats` until the rest shows about the quality asked for, or can have about the size asked for.
-    /// Then fits the rest to `refining`. Returns it with its sensitivity. `sensitivity` is the sensitivity of `splats`, and
-    /// `source_bytes` the size of the source.
+    /// Removes and merges Gaussians of `splats` until the rest shows about the quality asked for, or can have about the size asked for.
+    /// Then fits the rest to `refining`. `sensitivity` is the sensitivity of `splats`, and `source_bytes` the size of the source.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -40,7 +49,7 @@ impl Packing {
         refining: &Refining,
         judge: &mut Judge,
         source_bytes: u64,
-    ) -> Result<(Splats, Sensitivity, RefineReport)> {
+    ) -> Result<Reduced> {
         let progress = removal.progress;
         let (decibels, least) = match self.quality {
             Quality::Target(target @ (Target::Size(_) | Target::Ratio(_))) => {
@@ -58,21 +67,32 @@ impl Packing {
             Quality::Target(target) => (target.asked(), false),
             Quality::Preset(preset) => (preset.decibels(), false),
         };
-        let value = |score: Score| Ok::<_, Error>(if least { score.least } else { score.judged });
+        let value = |score: Score| if least { score.least } else { score.judged };
         let mut tries = if judge.views_are_given() { &BELOW_GIVEN[..] } else { &BELOW_FOUND }.iter();
         loop {
             let below = tries.next();
             let made = match below {
                 Some(below) => {
-                    let quality = &mut |splats: &Splats| value(judge.score(splats, progress)?);
+                    let quality =
+                        &mut |splats: &Splats| Ok::<_, Error>(value(judge.score(splats, progress)?));
                     removal.down_to(decibels - below, splats, sensitivity.clone(), quality)?
                 }
                 None => (splats.clone(), sensitivity.clone()),
             };
             let fitted = self.fitted(made, removal, refining, judge, decibels)?;
-            if below.is_none() || value(judge.score(&fitted.0, progress)?)? >= decibels + ABOVE {
+            if below.is_none() || value(fitted.score) >= decibels + ABOVE {
                 return Ok(fitted);
             }
+        }
+    }
+
+    /// Returns the expected gain of fits to what is quantised of a reduced scene. `given` tells whether cameras were given.
+    pub(crate) fn refined_gain(&self, score: Score, given: bool) -> Gain {
+        match self.quality {
+            Quality::Target(Target::MinPsnr(_)) => Gain::refined(score.least, given),
+            // The file is judged beside the reduced scene, and fitted to the pictures of the original.
+            Quality::Preset(_) if self.max_gaussians.is_some() => Gain::Amount(0.0),
+            _ => Gain::refined(score.judged, given),
         }
     }
 
@@ -84,7 +104,7 @@ impl Packing {
         refining: &Refining,
         judge: &mut Judge,
         decibels: f64,
-    ) -> Result<(Splats, Sensitivity, RefineReport)> {
+    ) -> Result<Reduced> {
         let progress = removal.progress;
         let RefineSteps { all, .. } = refining.steps;
         let before = judge.score(&splats, progress)?;
@@ -94,14 +114,14 @@ impl Packing {
         let cost = RestCost::new(sensitivity.colour.iter().copied(), step);
         let shares = refining.shares(&splats, &sensitivity, before.mean);
         refining.refine(&mut splats, Free::All, all, &cost, Some(&shares), progress)?;
-        let after = judge.score(&splats, progress)?.judged;
+        let score = judge.score(&splats, progress)?;
         let report = RefineReport {
             steps: all,
             gaussians: splats.len(),
             before_psnr: before.judged,
-            after_psnr: after,
+            after_psnr: score.judged,
         };
         let sensitivity = removal.views.sensitivity(removal.renderer, &splats, progress)?;
-        Ok((splats, sensitivity, report))
+        Ok(Reduced { splats, sensitivity, report, score })
     }
 }

@@ -14,6 +14,7 @@ use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErr
 use crate::drawing::{DrawOptions, draw_views};
 use crate::effort::RefineSteps;
 use crate::error::Result;
+use crate::gain::Gain;
 use crate::interim::interim_changes;
 use crate::only_cancels::OneStep;
 use crate::refine::{Free, Refining, RestCost};
@@ -33,14 +34,14 @@ const MOST_LOG_OPACITY: f32 = 0.5;
 /// Approximate gain of the judged quality by refitting, in dB, with given cameras and with found views.
 const GAIN_GIVEN: f64 = 4.0;
 pub(crate) const GAIN_FOUND: f64 = 0.8;
-/// Approximate gain of the judged quality by fits of a refined scene to what is quantised, in dB.
-const GAIN_REFINED: f64 = 3.0;
 
 /// A packer whose files are refitted, if refitting is allowed.
 pub(crate) struct Refitting<S> {
     packer: Packer<S>,
     fit: Option<Fit>,
     refining: Option<Refining>,
+    /// The expected gain of the judged quality by refitting.
+    pub(crate) gain: Gain,
 }
 
 /// The views and pictures to which base colours and opacities are fitted.
@@ -59,12 +60,14 @@ impl<S: Borrow<Splats>> Refitting<S> {
     /// Returns files of `packer`. If there is a `fit`, their base colours and opacities are fitted to it; otherwise they
     /// are those of `packer`.
     pub(crate) fn new(packer: Packer<S>, fit: Option<Fit>) -> Self {
-        Self { packer, fit, refining: None }
+        let gain =
+            Gain::Amount(fit.as_ref().map_or(0.0, |fit| if fit.given { GAIN_GIVEN } else { GAIN_FOUND }));
+        Self { packer, fit, refining: None, gain }
     }
 
-    /// Refines files, if there is a `refining`, instead of fitting base colours and opacities alone.
-    pub(crate) fn refining(self, refining: Option<Refining>) -> Self {
-        Self { refining, ..self }
+    /// Fits files to `refining`, instead of fitting base colours and opacities alone. `gain` is the expected gain.
+    pub(crate) fn refining(self, refining: Refining, gain: Gain) -> Self {
+        Self { refining: Some(refining), gain, ..self }
     }
 
     /// Returns whether files are refined. Making the same file once more then takes minutes.
@@ -82,18 +85,9 @@ impl<S: Borrow<Splats>> Refitting<S> {
         self.fit.is_some()
     }
 
-    /// Returns the expected gain of the judged quality by refitting, in dB.
-    pub(crate) fn gain(&self) -> f64 {
-        self.fit.as_ref().map_or(0.0, |fit| match &self.refining {
-            Some(_) => GAIN_REFINED,
-            None if fit.given => GAIN_GIVEN,
-            None => GAIN_FOUND,
-        })
-    }
-
     /// Returns the overall step for pictures of about this PSNR, in dB, after refitting.
     pub(crate) fn step_for(&self, decibels: f64) -> f64 {
-        self.packer.step_for(decibels - self.gain())
+        self.packer.step_for(self.gain.before(decibels))
     }
 
     /// Packs at an overall `step`, without refitting. `floor` tells whether visible Gaussians keep a least precision.

@@ -203,12 +203,13 @@ impl Packing {
             if let Some(effort) = self.refine {
                 let to = Refining::to(&splats, fitted, effort, progress)?;
                 let judges = views.some_judging(PRESET_JUDGES);
-                let mut judge = Judge::new(self.renderer()?, &splats, &judges, given, progress)?;
+                let judge = Judge::new(self.renderer()?, &splats, &judges, given, progress)?;
+                let mut judge = judge.of_refined(true);
                 let start = fewer.as_ref().unwrap_or(&splats);
                 let bytes = source.source_bytes();
                 let made = self.reduced(start, sensitivity, &mut removal, &to, &mut judge, bytes)?;
-                (fewer, sensitivity) = (Some(made.0), made.1);
-                (refining, refined) = (Some(to), Some(made.2));
+                refining = Some((to, self.refined_gain(made.score, given)));
+                (fewer, sensitivity, refined) = (Some(made.splats), made.sensitivity, Some(made.report));
             }
         }
         let packed_scene = fewer.as_ref().unwrap_or(&splats);
@@ -218,7 +219,11 @@ impl Packing {
         };
         let packer = Packer::new(packed_scene, &sensitivity, &options)?;
         drop(sensitivity);
-        let refitting = Refitting::new(packer, fit).refining(refining);
+        let refitting = Refitting::new(packer, fit);
+        let refitting = match refining {
+            Some((refining, gain)) => refitting.refining(refining, gain),
+            None => refitting,
+        };
         let (packed, report, judge, score) = match self.quality {
             Quality::Preset(preset) => {
                 // A preset cannot make up for Gaussians that a limit removes, so it is judged against the reduced scene.
