@@ -44,7 +44,6 @@ mod facts;
 mod fewer;
 mod first_view;
 mod found;
-mod gain;
 mod interim;
 mod judge;
 mod layout;

@@ -14,7 +14,6 @@ use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErr
 use crate::drawing::{DrawOptions, draw_views};
 use crate::effort::RefineSteps;
 use crate::error::Result;
-use crate::gain::Gain;
 use crate::interim::interim_changes;
 use crate::only_cancels::OneStep;
 use crate::refine::{Free, Refining, RestCost};
@@ -40,8 +39,8 @@ pub(crate) struct Refitting<S> {
     packer: Packer<S>,
     fit: Option<Fit>,
     refining: Option<Refining>,
-    /// The expected gain of the judged quality by refitting.
-    pub(crate) gain: Gain,
+    /// The expected gain of the judged quality by refitting, in dB.
+    pub(crate) gain: f64,
 }
 
 /// The views and pictures to which base colours and opacities are fitted.
@@ -60,13 +59,12 @@ impl<S: Borrow<Splats>> Refitting<S> {
     /// Returns files of `packer`. If there is a `fit`, their base colours and opacities are fitted to it; otherwise they
     /// are those of `packer`.
     pub(crate) fn new(packer: Packer<S>, fit: Option<Fit>) -> Self {
-        let gain =
-            Gain::Amount(fit.as_ref().map_or(0.0, |fit| if fit.given { GAIN_GIVEN } else { GAIN_FOUND }));
+        let gain = fit.as_ref().map_or(0.0, |fit| if fit.given { GAIN_GIVEN } else { GAIN_FOUND });
         Self { packer, fit, refining: None, gain }
     }
 
-    /// Fits files to `refining`, instead of fitting base colours and opacities alone. `gain` is the expected gain.
-    pub(crate) fn refining(self, refining: Refining, gain: Gain) -> Self {
+    /// Fits files to `refining`, instead of fitting base colours and opacities alone. `gain` is the expected gain, in dB.
+    pub(crate) fn refining(self, refining: Refining, gain: f64) -> Self {
         Self { refining: Some(refining), gain, ..self }
     }
 
@@ -87,7 +85,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
 
     /// Returns the overall step for pictures of about this PSNR, in dB, after refitting.
     pub(crate) fn step_for(&self, decibels: f64) -> f64 {
-        self.packer.step_for(self.gain.before(decibels))
+        self.packer.step_for(decibels - self.gain)
     }
 
     /// Packs at an overall `step`, without refitting. `floor` tells whether visible Gaussians keep a least precision.

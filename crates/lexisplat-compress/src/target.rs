@@ -7,7 +7,6 @@ use lexisplat::packed::{Packed, Preset, ReachedRecord, TargetRecord};
 use lexisplat::{CompressReport, Progress, Splats};
 
 use crate::error::{Error, Result};
-use crate::gain::Gain;
 use crate::judge::{Judge, Score, reached};
 use crate::refit::{Refitted, Refitting};
 
@@ -193,7 +192,7 @@ pub(crate) fn pack_to_preset(
     let after = |log_step: f64, value: f64| next_step(&[Try { log_step, value }], aim, &mut -DB_PER_HALVING);
     let (mut quantised, mut file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     let first = judge.score(&file.0.unpack()?, progress)?;
-    let expected = packer.gain.after(first.judged);
+    let expected = first.judged + packer.gain;
     let mut is_first = !packer.refits();
     if (expected - aim).abs() > CLOSE_FIRST
         && let Some(next) = after(log_step, expected)
@@ -291,7 +290,8 @@ impl Search {
     /// the value nearest to the target as the inner error if no file meets the target.
     ///
     /// Refitting takes longer than the rest, and gains about as much at one step as at the next. Files that are not
-    /// refitted therefore tell at which step to refit one. The gain of that file tells the next step.
+    /// refitted therefore tell at which step to refit one. The gain of that file tells the next step. Of a refined scene the gain
+    /// changes with the step, so from two refined files on these alone tell it.
     fn run(
         &self,
         packer: &Refitting<impl Borrow<Splats>>,
@@ -300,9 +300,9 @@ impl Search {
         progress: &dyn Progress,
     ) -> Result<std::result::Result<Found, f64>> {
         let (mut log_step, mut slope) = (self.log_step, self.slope);
-        let mut gain = if self.is_size { Gain::Amount(0.0) } else { packer.gain };
+        let mut gain = if self.is_size { 0.0 } else { packer.gain };
         let mut is_measured = !packer.refits();
-        let mut tries: Vec<Try> = Vec::new();
+        let (mut tries, mut refined): (Vec<Try>, Vec<Try>) = (Vec::new(), Vec::new());
         let mut best: Option<Found> = None;
         // Number of files in a row that were too far from the target to be refitted. Values jump, so there may be no step
         // that is near enough.
@@ -314,10 +314,10 @@ impl Search {
             let (quantised, file) = packer.quantise(libm::exp2(log_step), floor, progress)?;
             let (plain, score) = self.value(&file.0, judge, progress)?;
             tries.push(Try { log_step, value: plain });
-            let off = gain.after(plain) - self.wanted;
+            let off = plain + gain - self.wanted;
             let (near, most_passed) = if is_measured { (NEAR_AGAIN * self.near, 1) } else { (self.near, 3) };
-            let is_near = off.abs() < near || passed >= most_passed;
-            if let Some(next) = next_step(&tries, gain.before(self.wanted + margin), &mut slope)
+            let is_near = off.abs() < near || passed >= most_passed || refined.len() > 1;
+            if let Some(next) = next_step(&tries, self.wanted - gain + margin, &mut slope)
                 && !is_near
             {
                 log_step = next;
@@ -334,7 +334,10 @@ impl Search {
             let packed = &refitted.file.0;
             let (value, score) =
                 if packer.refits() { self.value(packed, judge, progress)? } else { (plain, score) };
-            (gain, is_measured) = (gain.measured(plain, value), true);
+            (gain, is_measured) = (value - plain, true);
+            if packer.refines() && !self.is_size {
+                refined.push(Try { log_step, value });
+            }
             nearest = nearest.max(value);
             // Values do not change evenly with the step: after a narrow miss the next step may miss narrowly too.
             margin = (margin + (self.wanted - value).max(0.0)).min(MOST_MARGIN * self.close);
@@ -357,11 +360,16 @@ impl Search {
             if is_close {
                 break;
             }
-            let Some(next) = next_step(&tries, gain.before(self.wanted + margin), &mut slope) else { break };
+            let wanted = self.wanted + margin;
+            let next = match refined.len() {
+                0 | 1 => next_step(&tries, wanted - gain, &mut slope),
+                _ => next_step(&refined, wanted, &mut slope),
+            };
+            let Some(next) = next else { break };
             log_step = next;
         }
         let Some(best) = best else {
-            let expected = tries.iter().map(|t| gain.after(t.value));
+            let expected = tries.iter().map(|t| t.value + gain);
             return Ok(Err(if nearest.is_finite() { nearest } else { expected.fold(nearest, f64::max) }));
         };
         if best.complete {
