@@ -7,14 +7,12 @@ use lexisplat::packed::curve_order;
 use lexisplat::{Geometry, Sensitivity, Splats};
 use rayon::prelude::*;
 
-/// Number of Gaussians after each one along the curve of the coder with which it may be merged.
+/// Number of Gaussians with which each one may be merged: those that follow it along the curve of the coder.
 const NEIGHBOURS: usize = 12;
 /// Least overlap of two Gaussians that may be merged. 1 is that of two equal ones.
 const LEAST_OVERLAP: f64 = 0.2;
 /// Smallest and largest opacity of a merged Gaussian.
 const OPACITIES: [f64; 2] = [1e-3, 0.99];
-/// Smallest variance of a merged Gaussian, in squares of a world unit, whose logarithm is finite.
-const LEAST_VARIANCE: f64 = 1e-30;
 /// Passes over the three pairs of axes that make a covariance diagonal. Each squares the error, about.
 const SWEEPS: usize = 8;
 /// Mean squared value of an SH basis function over all directions: `1 / 4π`.
@@ -103,7 +101,8 @@ fn squared_distance_of_colours(splats: &Splats, pair: [usize; 2]) -> f64 {
     one.zip(other).map(|(a, b)| f64::from(a - b) * f64::from(a - b)).sum()
 }
 
-/// Gives Gaussian `one` of a pair the values of the `merged` Gaussian. `weights` are the shares of the two in it.
+/// Gives Gaussian `one` of a pair the values of the `merged` Gaussian. `weights` are the shares of the two in it. Extra properties
+/// stay those of `one`.
 #[expect(clippy::cast_possible_truncation, reason = "values of single precision")]
 fn merge(splats: &mut Splats, [one, other]: [usize; 2], (merged, weights): (Shape, [f64; 2])) {
     let rest = splats.degree.rest();
@@ -114,7 +113,7 @@ fn merge(splats: &mut Splats, [one, other]: [usize; 2], (merged, weights): (Shap
             mean(splats.sh_rest[one * rest + k], splats.sh_rest[other * rest + k]);
     }
     let (variances, axes) = principal(merged.covariance);
-    let scales = variances.map(|v| 0.5 * libm::log(v.max(LEAST_VARIANCE)));
+    let scales = variances.map(|v| 0.5 * libm::log(v.max(f64::MIN_POSITIVE)));
     let opacity = (merged.weight / area(scales)).clamp(OPACITIES[0], OPACITIES[1]);
     let turned = DQuat::from_mat3(&axes);
     let g = &mut splats.geometry;

@@ -200,8 +200,8 @@ impl Packing {
         Self { max_gaussians: most.into(), ..self }
     }
 
-    /// Removes more Gaussians, and fits everything of the others to pictures of the scene (docs/METHOD.md, "Refining"). The
-    /// file is then smaller at the same quality, and takes minutes instead of seconds.
+    /// Removes and merges more Gaussians, and fits everything of the others to pictures of the scene (docs/METHOD.md,
+    /// "Refining"). The file is then smaller at the same quality, and takes minutes instead of seconds.
     #[must_use]
     pub fn with_refine(self, refine: impl Into<Option<Refine>>) -> Self {
         Self { refine: refine.into(), ..self }
