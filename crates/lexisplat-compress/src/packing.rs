@@ -193,8 +193,8 @@ impl Packing {
         Self { looked: Some(looked), ..self }
     }
 
-    /// Removes and merges Gaussians, those that change pictures least, until there are at most `most`, 1 or more. A preset is then the quality
-    /// relative to the reduced scene. A target in decibels is relative to the original scene.
+    /// Removes and merges Gaussians, those that change pictures least, until there are at most `most`, 1 or more. A preset is
+    /// then the quality relative to the reduced scene. A target in decibels is relative to the original scene.
     #[must_use]
     pub fn with_max_gaussians(self, most: impl Into<Option<usize>>) -> Self {
         Self { max_gaussians: most.into(), ..self }

@@ -20,8 +20,8 @@ const BELOW_FOUND: [f64; 1] = [-5.0];
 /// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
 /// it needs so fine steps that the file becomes larger (docs/METHOD.md, "Refining").
 const ABOVE: f64 = 2.0;
-/// Approximate gain by fits to what is quantised, as a share of the amount by which the quality exceeds the quality asked for before
-/// quantisation: with given cameras, which have 0.1 (lego) to 0.7 (room), and with found views.
+/// Approximate gain by fits to what is quantised, as a share of the amount by which the quality exceeds the quality asked for
+/// before quantisation: with given cameras, which have 0.1 (lego) to 0.7 (room), and with found views.
 const GAIN_GIVEN: f64 = 0.55;
 const GAIN_FOUND: f64 = 0.03;
 /// Bytes of a Gaussian in a refined file, from which a size gives the number of Gaussians.
@@ -39,8 +39,8 @@ pub(crate) struct Reduced {
 }
 
 impl Packing {
-    /// Removes and merges Gaussians of `splats` until the rest shows about the quality asked for, or can have about the size asked for.
-    /// Then fits the rest to `refining`. `sensitivity` is the sensitivity of `splats`, and `source_bytes` the size of the source.
+    /// Removes and merges Gaussians of `splats` until the rest shows about the quality asked for, or can have about the size
+    /// asked for. Then fits the rest to `refining`. `sensitivity` is the sensitivity of `splats`, and `source_bytes` the size of the source.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
