@@ -19,9 +19,10 @@ const SWEEPS: usize = 8;
 const MEAN_SQUARED_BASIS: f64 = 1.0 / (4.0 * std::f64::consts::PI);
 
 /// Makes `count` fewer Gaussians of `splats`: removes one, or merges two, whichever changes pictures least, and no Gaussian twice.
-/// Returns false for those that are left to remove. `sensitivity` is the sensitivity of `splats`.
+/// Returns false for the Gaussians that are left to remove. `sensitivity` is the sensitivity of `splats`.
 pub(crate) fn lessened(splats: &mut Splats, sensitivity: &Sensitivity, count: usize) -> Vec<bool> {
-    let shapes: Vec<Shape> = (0..splats.len()).map(|i| Shape::of(&splats.geometry, i)).collect();
+    let shapes: Vec<Shape> =
+        (0..splats.len()).into_par_iter().map(|i| Shape::of(&splats.geometry, i)).collect();
     let (mut free, mut keep) = (vec![true; splats.len()], vec![true; splats.len()]);
     let ways = ways(splats, &shapes, sensitivity);
     let mut gone = 0;
@@ -70,8 +71,8 @@ fn ways(splats: &Splats, shapes: &[Shape], sensitivity: &Sensitivity) -> Vec<Way
 /// Returns the squared error of pictures, about, if two Gaussians become one. Returns `None` if they overlap little, or if to
 /// remove one of them costs less.
 ///
-/// A picture is taken for the space around the Gaussians. Each is a function whose squared norm is the sensitivity to its opacity,
-/// and what the merged Gaussian cannot show of their sum is the error. Their colours move to the merged one's.
+/// A picture is taken for the space around the Gaussians. Each is a function whose squared norm is the sensitivity to its opacity.
+/// The error is the part of their sum that the merged Gaussian cannot show. Their colours move to the merged one's.
 fn cost_of_merging(
     splats: &Splats,
     shapes: &[Shape],

@@ -20,7 +20,7 @@ const BELOW_FOUND: [f64; 1] = [-5.0];
 /// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
 /// it needs so fine steps that the file becomes larger (docs/METHOD.md, "Refining").
 const ABOVE: f64 = 2.0;
-/// Approximate gain by fits to what is quantised, as a share of the amount by which the quality exceeds the quality asked for
+/// Approximate gain by fits to the quantised scene, as a share of the amount by which the quality exceeds the quality asked for
 /// before quantisation: with given cameras, which have 0.1 (lego) to 0.7 (room), and with found views.
 const GAIN_GIVEN: f64 = 0.55;
 const GAIN_FOUND: f64 = 0.03;
@@ -35,7 +35,9 @@ pub(crate) struct Reduced {
     pub(crate) sensitivity: Sensitivity,
     pub(crate) report: RefineReport,
     /// Score before quantisation.
-    pub(crate) score: Score,
+    score: Score,
+    /// Expected gain by fits to the quantised scene, in dB.
+    pub(crate) gain: f64,
 }
 
 impl Packing {
@@ -83,24 +85,17 @@ impl Packing {
                 None => (splats.clone(), sensitivity.clone()),
             };
             let fitted = self.fitted(made, removal, refining, judge, decibels)?;
-            if below.is_none() || value(fitted.score) >= decibels + ABOVE {
-                return Ok(fitted);
+            let reached = value(fitted.score);
+            if below.is_none() || reached >= decibels + ABOVE {
+                let share = match self.quality {
+                    // The file is judged beside the reduced scene, and fitted to the pictures of the original.
+                    Quality::Preset(_) if self.max_gaussians.is_some() => 0.0,
+                    _ if judge.views_are_given() => GAIN_GIVEN,
+                    _ => GAIN_FOUND,
+                };
+                return Ok(Reduced { gain: share * (reached - decibels), ..fitted });
             }
         }
-    }
-
-    /// Returns the expected gain of fits to what is quantised of a reduced scene, in dB. `score` is its score before quantisation,
-    /// and `given` tells whether cameras were given.
-    pub(crate) fn refined_gain(&self, score: Score, given: bool) -> f64 {
-        let above = match self.quality {
-            // The file is judged beside the reduced scene, and fitted to the pictures of the original.
-            Quality::Preset(_) if self.max_gaussians.is_some() => 0.0,
-            Quality::Preset(preset) => score.judged - preset.decibels(),
-            Quality::Target(Target::MinPsnr(decibels)) => score.least - decibels,
-            Quality::Target(Target::MeanPsnr(decibels)) => score.judged - decibels,
-            Quality::Target(Target::Size(_) | Target::Ratio(_)) => 0.0,
-        };
-        above * if given { GAIN_GIVEN } else { GAIN_FOUND }
     }
 
     /// Fits a scene to `refining`, and measures its sensitivity again. `decibels` is the quality asked for.
@@ -129,6 +124,6 @@ impl Packing {
             after_psnr: score.judged,
         };
         let sensitivity = removal.views.sensitivity(removal.renderer, &splats, progress)?;
-        Ok(Reduced { splats, sensitivity, report, score })
+        Ok(Reduced { splats, sensitivity, report, score, gain: 0.0 })
     }
 }

@@ -65,7 +65,7 @@ pub struct CompressionReport {
     pub sensitivity: Option<SensitivitySource>,
     /// The GPU that measured the sensitivity, or `cpu`. `None` if the geometry is exact.
     pub device: Option<String>,
-    /// Number of Gaussians of the source that were left out.
+    /// Number of Gaussians of the source that were left out or merged with others.
     pub removed: u64,
     /// The result of refining, if the scene was refined.
     pub refined: Option<RefineReport>,

@@ -208,7 +208,7 @@ impl Packing {
                 let start = fewer.as_ref().unwrap_or(&splats);
                 let bytes = source.source_bytes();
                 let made = self.reduced(start, sensitivity, &mut removal, &to, &mut judge, bytes)?;
-                refining = Some((to, self.refined_gain(made.score, given)));
+                refining = Some((to, made.gain));
                 (fewer, sensitivity, refined) = (Some(made.splats), made.sensitivity, Some(made.report));
             }
         }

@@ -79,9 +79,9 @@ pub(crate) struct Compress {
     /// Gaussians and for rounding. --keep-order and --tol keep all Gaussians too.
     #[arg(long)]
     pub(crate) keep_all: bool,
-    /// Keep at most N Gaussians, for viewers with a limit. Those that change the pictures least are left out, and
-    /// pairs are merged. --preset is then the quality relative to the reduced scene; --psnr and --min-psnr are relative to the
-    /// original scene [default: no limit].
+    /// Keep at most N Gaussians, for viewers with a limit. The Gaussians that change the pictures least are left
+    /// out, and pairs are merged. --preset is then the quality relative to the reduced scene; --psnr and --min-psnr are
+    /// relative to the original scene [default: no limit].
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) max_gaussians: Option<usize>,
     /// Remove and merge more Gaussians, and fit the others to pictures of the scene: positions, shapes, colours and
