@@ -80,7 +80,8 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
     if in_parts {
         return packed_in_parts(splats, &options, decibels);
     }
-    let sensitivity = if how & 4 == 0 {
+    let measured = how & 4 != 0;
+    let sensitivity = if !measured {
         Sensitivity::guess(&splats.geometry)
     } else {
         let cameras = orbit(&splats.geometry, 2, SIDES.0, SIDES.1);
@@ -101,7 +102,12 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
     let mut bytes = Vec::new();
     LexiWriter::packed(&packed).write(&mut bytes, &Silent).expect("written");
     let model = lexi::read_bytes("packed.lexi", &bytes, &limits()).expect("what was packed can be read");
-    assert_eq!(model.len(), splats.len());
+    assert_eq!(model.len() as u64 + packed.head().removed, splats.len() as u64);
+    assert!(
+        measured && options.may_change() || packed.head().removed == 0,
+        "{} removed",
+        packed.head().removed
+    );
     invariants::model(&model);
 }
 
