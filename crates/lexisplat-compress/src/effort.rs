@@ -9,6 +9,10 @@ pub(crate) const REFINE: &str = "refine";
 /// Steps of the fit of all values with [`Refine::Quick`] and [`Refine::Thorough`].
 const QUICK: usize = 800;
 const THOROUGH: usize = 2000;
+/// Amounts by which the quality of the Gaussians that stay may fall short of the quality asked for before the first fit, in dB,
+/// with given cameras. More steps win back more, so more Gaussians can go from [`THOROUGH`] steps on.
+const QUICK_BELOW: f64 = 1.8;
+const THOROUGH_BELOW: f64 = 2.5;
 /// Steps of the other two fits, as shares of the steps of the first.
 const RADIANCE: f64 = 0.6;
 const APPEARANCE: f64 = 0.2;
@@ -50,8 +54,8 @@ impl FromStr for Refine {
     }
 }
 
-/// Numbers of steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Numbers of steps, and how far removal and merging go before them.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RefineSteps {
     /// Of the fit of all values, before quantisation.
     pub(crate) all: usize,
@@ -59,6 +63,9 @@ pub(crate) struct RefineSteps {
     pub(crate) radiance: usize,
     /// Of the fit of base colours and opacities to quantised SH-rest.
     pub(crate) appearance: usize,
+    /// Amount by which the quality of the Gaussians that stay may fall short of the quality asked for before the first fit, in
+    /// dB, with given cameras.
+    pub(crate) below: f64,
 }
 
 impl Refine {
@@ -84,7 +91,9 @@ impl Refine {
             }
         };
         let share = |share: f64| (share * all).clamp(1.0, MOST).round() as usize;
-        RefineSteps { all: share(1.0), radiance: share(RADIANCE), appearance: share(APPEARANCE) }
+        let [all, radiance, appearance] = [1.0, RADIANCE, APPEARANCE].map(share);
+        let below = if all < THOROUGH { QUICK_BELOW } else { THOROUGH_BELOW };
+        RefineSteps { all, radiance, appearance, below }
     }
 }
 
@@ -109,7 +118,9 @@ mod tests {
         let (one, two) = (of(1.0), of(2.0));
         assert!(one.all > 100 && one.radiance < one.all && one.appearance < one.radiance, "{one:?}");
         assert!(two.all.abs_diff(2 * one.all) <= 1, "{one:?} {two:?}");
-        assert_eq!(of(1e-12), RefineSteps { all: 1, radiance: 1, appearance: 1 });
+        let least = of(1e-12);
+        assert_eq!((least.all, least.radiance, least.appearance), (1, 1, 1));
+        assert!(least.below < of(1e9).below);
         assert_eq!(of(1e300).all, 10_000_000);
     }
 }

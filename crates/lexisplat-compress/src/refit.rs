@@ -23,6 +23,8 @@ use crate::solve::{KEPT_BYTES, ROW, kinds, solve};
 /// views. More steps gain less on other views than the fitted ones (docs/METHOD.md).
 const STEPS_GIVEN: usize = 5;
 const STEPS_FOUND: usize = 3;
+/// Number of these steps where all values are refined later. More steps change the refined scene by less than 0.1 dB.
+const STEPS_BEFORE_REFINING: usize = 2;
 /// Weight of the distance to the colours and opacities before the fit, as a multiple of the sensitivity of pictures.
 /// The term is there because other views than the fitted ones depend on these values too.
 const RIDGE: f32 = 0.5;
@@ -51,6 +53,8 @@ pub(crate) struct Fit {
     targets: Vec<Image>,
     /// Whether cameras were given.
     given: bool,
+    /// Number of conjugate-gradient steps.
+    steps: usize,
     /// Largest number of bytes that are kept from one step to the next.
     kept_bytes: u64,
 }
@@ -223,7 +227,13 @@ impl Fit {
     ) -> Result<Self> {
         let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
         let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, progress)?;
-        Ok(Self { cameras, targets, given, kept_bytes: KEPT_BYTES })
+        let steps = if given { STEPS_GIVEN } else { STEPS_FOUND };
+        Ok(Self { cameras, targets, given, steps, kept_bytes: KEPT_BYTES })
+    }
+
+    /// Returns this fit with few steps, for a scene of which all values are refined later.
+    pub(crate) fn before_refining(self) -> Self {
+        Self { steps: STEPS_BEFORE_REFINING, ..self }
     }
 
     /// Returns this fit with another largest number of bytes that are kept from one step to the next. It changes no result.
@@ -243,9 +253,8 @@ impl Fit {
         progress: &dyn Progress,
     ) -> Result<Vec<Appearance>> {
         let mut adjoint = PictureAdjoint::new(scene, &self.cameras, self.kept_bytes)?;
-        let steps = if self.given { STEPS_GIVEN } else { STEPS_FOUND };
         // The views are drawn once for the errors and once in each step.
-        progress.begin(Stage::Draw, ((1 + steps) * self.cameras.len()) as u64);
+        progress.begin(Stage::Draw, ((1 + self.steps) * self.cameras.len()) as u64);
         let rounds = &OneStep(progress);
         let PictureErrors { errors, row_sums, opacity_squares, .. } =
             adjoint.of_errors(&self.targets, rounds)?;
@@ -257,7 +266,7 @@ impl Fit {
             let own = [ROW * row_sums[i] + colour, OPACITY_DIAGONAL * opacity_squares[i] + opacity];
             diagonal.push(kinds(own));
         }
-        let found = solve(&mut adjoint, errors, &ridge, &diagonal, steps, rounds)?;
+        let found = solve(&mut adjoint, errors, &ridge, &diagonal, self.steps, rounds)?;
         progress.end();
         let geometry = scene.geometry();
         Ok(found.iter().enumerate().map(|(i, change)| changed(geometry, i, change)).collect())

@@ -191,6 +191,7 @@ impl Packing {
             true => Some(Fit::to(&splats, views.fitting(&splats), given, progress)?),
             false => None,
         };
+        let fit = if self.refine.is_some() { fit.map(Fit::before_refining) } else { fit };
         let most = self.max_gaussians.filter(|&most| most < splats.len());
         let (mut fewer, mut sensitivity) = (None, sensitivity);
         let (mut refining, mut refined) = (None, None);
