@@ -81,11 +81,11 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
         return packed_in_parts(splats, &options, decibels);
     }
     let measured = how & 4 != 0;
-    let sensitivity = if !measured {
-        Sensitivity::guess(&splats.geometry)
-    } else {
+    let sensitivity = if measured {
         let cameras = orbit(&splats.geometry, 2, SIDES.0, SIDES.1);
         lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &Silent).expect("measured")
+    } else {
+        Sensitivity::guess(&splats.geometry)
     };
     let packer = match Packer::new(splats, &sensitivity, &options) {
         Ok(packer) => packer,
@@ -102,12 +102,9 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
     let mut bytes = Vec::new();
     LexiWriter::packed(&packed).write(&mut bytes, &Silent).expect("written");
     let model = lexi::read_bytes("packed.lexi", &bytes, &limits()).expect("what was packed can be read");
-    assert_eq!(model.len() as u64 + packed.head().removed, splats.len() as u64);
-    assert!(
-        measured && options.may_change() || packed.head().removed == 0,
-        "{} removed",
-        packed.head().removed
-    );
+    let removed = packed.head().removed;
+    assert_eq!(model.len() as u64 + removed, splats.len() as u64);
+    assert!(removed == 0 || measured && options.may_change(), "{removed} removed");
     invariants::model(&model);
 }
 

@@ -30,7 +30,7 @@ const MOST: f64 = 1e7;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Refine {
-    /// Two fifths of the steps of [`Self::Thorough`].
+    /// Two fifths of the steps of [`Self::Thorough`]. With given cameras more Gaussians stay.
     Quick,
     /// The steps after which more gain little.
     Thorough,
@@ -54,8 +54,8 @@ impl FromStr for Refine {
     }
 }
 
-/// Numbers of steps, and how far removal and merging go before them.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Numbers of steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RefineSteps {
     /// Of the fit of all values, before quantisation.
     pub(crate) all: usize,
@@ -63,9 +63,14 @@ pub(crate) struct RefineSteps {
     pub(crate) radiance: usize,
     /// Of the fit of base colours and opacities to quantised SH-rest.
     pub(crate) appearance: usize,
-    /// Amount by which the quality of the Gaussians that stay may fall short of the quality asked for before the first fit, in
-    /// dB, with given cameras.
-    pub(crate) below: f64,
+}
+
+impl RefineSteps {
+    /// Returns the amount by which the quality of the Gaussians that stay may fall short of the quality asked for before the
+    /// first fit, in dB, with given cameras.
+    pub(crate) fn below(self) -> f64 {
+        if self.all < THOROUGH { QUICK_BELOW } else { THOROUGH_BELOW }
+    }
 }
 
 impl Refine {
@@ -91,9 +96,7 @@ impl Refine {
             }
         };
         let share = |share: f64| (share * all).clamp(1.0, MOST).round() as usize;
-        let [all, radiance, appearance] = [1.0, RADIANCE, APPEARANCE].map(share);
-        let below = if all < THOROUGH { QUICK_BELOW } else { THOROUGH_BELOW };
-        RefineSteps { all, radiance, appearance, below }
+        RefineSteps { all: share(1.0), radiance: share(RADIANCE), appearance: share(APPEARANCE) }
     }
 }
 
@@ -118,9 +121,8 @@ mod tests {
         let (one, two) = (of(1.0), of(2.0));
         assert!(one.all > 100 && one.radiance < one.all && one.appearance < one.radiance, "{one:?}");
         assert!(two.all.abs_diff(2 * one.all) <= 1, "{one:?} {two:?}");
-        let least = of(1e-12);
-        assert_eq!((least.all, least.radiance, least.appearance), (1, 1, 1));
-        assert!(least.below < of(1e9).below);
+        assert_eq!(of(1e-12), RefineSteps { all: 1, radiance: 1, appearance: 1 });
+        assert!(of(1e-12).below() < of(1e9).below());
         assert_eq!(of(1e300).all, 10_000_000);
     }
 }

@@ -13,8 +13,8 @@ use crate::report::RefineReport;
 use crate::target::Target;
 
 /// Amounts by which the quality of the Gaussians that stay may fall short of the quality asked for before they are refined,
-/// in dB. After a fit that gains too little more Gaussians stay, by the next amount. With given cameras [`RefineSteps::below`] comes
-/// first. Fits gain less in found views, which show more.
+/// in dB: with given cameras after [`RefineSteps::below`], and with found views. After a fit that gains too little more Gaussians
+/// stay, by the next amount. Fits gain less in found views, which show more.
 const NEXT_BELOW_GIVEN: [f64; 2] = [-1.5, -6.0];
 const BELOW_FOUND: f64 = -5.0;
 /// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
@@ -74,7 +74,7 @@ impl Packing {
         };
         let value = |score: Score| if least { score.least } else { score.judged };
         let (first, more) = match judge.views_are_given() {
-            true => (refining.steps.below, &NEXT_BELOW_GIVEN[..]),
+            true => (refining.steps.below(), &NEXT_BELOW_GIVEN[..]),
             false => (BELOW_FOUND, &[][..]),
         };
         let mut tries = std::iter::once(first).chain(more.iter().copied());

@@ -303,10 +303,11 @@ impl Search {
         progress: &dyn Progress,
     ) -> Result<std::result::Result<Found, f64>> {
         let (mut log_step, mut slope) = (self.log_step, self.slope);
-        let mut refined_slope = -REFINED_DB_PER_HALVING;
         let mut gain = if self.is_size { 0.0 } else { packer.gain };
         let mut is_measured = !packer.refits();
-        let (mut tries, mut refined): (Vec<Try>, Vec<Try>) = (Vec::new(), Vec::new());
+        // Unrefined files until a file is refined, and from then on refined files alone.
+        let mut tries: Vec<Try> = Vec::new();
+        let mut is_refined = false;
         let mut best: Option<Found> = None;
         // Number of files in a row that were too far from the target to be refitted. Values jump, so there may be no step
         // that is near enough.
@@ -317,7 +318,7 @@ impl Search {
             progress.check()?;
             let (quantised, file) = packer.quantise(libm::exp2(log_step), floor, progress)?;
             let mut plain = None;
-            if refined.is_empty() {
+            if !is_refined {
                 let (value, score) = self.value(&file.0, judge, progress)?;
                 tries.push(Try { log_step, value });
                 let off = value + gain - self.wanted;
@@ -349,7 +350,11 @@ impl Search {
                 (gain, is_measured) = (value - plain, true);
             }
             if packer.refines() && !self.is_size {
-                refined.push(Try { log_step, value });
+                if !is_refined {
+                    tries.clear();
+                    (slope, gain, is_refined) = (-REFINED_DB_PER_HALVING, 0.0, true);
+                }
+                tries.push(Try { log_step, value });
             }
             nearest = nearest.max(value);
             // Values do not change evenly with the step: after a narrow miss the next step may miss narrowly too.
@@ -374,11 +379,7 @@ impl Search {
                 break;
             }
             let wanted = self.wanted + margin;
-            let next = match refined.is_empty() {
-                true => next_step(&tries, wanted - gain, &mut slope),
-                false => next_step(&refined, wanted, &mut refined_slope),
-            };
-            let Some(next) = next else { break };
+            let Some(next) = next_step(&tries, wanted - gain, &mut slope) else { break };
             log_step = next;
         }
         let Some(best) = best else {
