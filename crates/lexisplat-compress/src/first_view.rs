@@ -61,7 +61,8 @@ pub(crate) fn first_view(
     let mut drawn = |cameras: Vec<Camera>| -> Result<Vec<Candidate>> {
         let draw = |camera: Camera| {
             progress.check()?;
-            let small = camera.with_max_width(SMALL[0]);
+            // Black shows how much of the picture is lit.
+            let small = camera.with_max_width(SMALL[0]).with_background(None);
             let picture = renderer.render(&scene, &small, &RenderOptions::default())?;
             Ok(Candidate { detail: detail(&picture), lit: lit(&picture), camera })
         };

@@ -4,6 +4,7 @@ use lexisplat::packed::ReachedRecord;
 use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, squared_error};
 
+use crate::backgrounds::opposite;
 use crate::decibels::decibels;
 use crate::error::Result;
 
@@ -78,11 +79,12 @@ impl Judge {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut judge = Self::new(renderer, part, judging, false, progress)?;
-        let scene = judge.renderer.prepare(Scene::from(part))?;
-        let white = RenderOptions::default().with_background([1.0; 3]);
+        let (scene, options) = (judge.renderer.prepare(Scene::from(part))?, RenderOptions::default());
         for View { camera, original, pixels } in &mut judge.views {
             progress.check()?;
-            *pixels = covered(camera, original, &judge.renderer.render(&scene, camera, &white)?);
+            let behind = opposite(camera.background.unwrap_or_default());
+            let other = camera.clone().with_background(behind);
+            *pixels = covered(camera, original, &judge.renderer.render(&scene, &other, &options)?);
         }
         drop(scene);
         Ok(judge)
@@ -142,13 +144,13 @@ impl Judge {
     }
 }
 
-/// Returns the number of pixels of `camera` that a scene covers. `black` and `white` are pictures of the scene over a black
-/// and a white background.
-fn covered(camera: &Camera, black: &Image, white: &Image) -> u64 {
-    let pairs = black.pixels.iter().zip(&white.pixels).enumerate();
+/// Returns the number of pixels of `camera` that a scene covers. One of the two pictures of the scene is over black, the other over
+/// white.
+fn covered(camera: &Camera, one: &Image, other: &Image) -> u64 {
+    let pairs = one.pixels.iter().zip(&other.pixels).enumerate();
     let within = pairs.filter(|(drawn, _)| camera.place_of_drawn(*drawn).is_some());
     // The share of the background in each pixel, which is equal in all channels.
-    let open: f64 = within.map(|(_, (black, white))| f64::from(white[0] - black[0]).clamp(0.0, 1.0)).sum();
+    let open: f64 = within.map(|(_, (one, other))| f64::from(one[0] - other[0]).abs().min(1.0)).sum();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the number of pixels")]
     let covered = (camera.drawn_pixels() as f64 - open).max(0.0).round() as u64;
     covered

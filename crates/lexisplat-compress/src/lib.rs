@@ -34,6 +34,7 @@
 //!
 //! A scene in parts goes through steps 1 to 4 part by part ([`tiles`]). docs/METHOD.md has the reasons and the figures.
 
+mod backgrounds;
 mod beginning;
 mod belonging;
 mod decibels;

@@ -25,20 +25,22 @@ struct View {
     position: [f32; 3],
     rotation: [[f32; 3]; 3],
     near: f32,
+    background: Option<[f32; 3]>,
 }
 
 impl From<&Camera> for View {
     fn from(camera: &Camera) -> Self {
-        let Camera { width, height, fx, fy, position, rotation, near, .. } = *camera;
+        let Camera { width, height, fx, fy, position, rotation, near, background, .. } = *camera;
         let (size, focal) = ([width, height], [fx, fy]);
-        Self { name: camera.name.clone(), size, focal, position, rotation, near }
+        Self { name: camera.name.clone(), size, focal, position, rotation, near, background }
     }
 }
 
 impl From<View> for Camera {
     fn from(view: View) -> Self {
-        let View { name, size: [width, height], focal: [fx, fy], position, rotation, near } = view;
-        Self { name, width, height, fx, fy, position, rotation, near, split: None, tiles: None }
+        let View { name, size: [width, height], focal: [fx, fy], position, rotation, near, background } =
+            view;
+        Self { name, width, height, fx, fy, position, rotation, near, split: None, tiles: None, background }
     }
 }
 

@@ -6,6 +6,7 @@ use lexisplat_render::{
     Camera, Renderer, Scene, Split, aside, between, interior_views, nearby, object, surround,
 };
 
+use crate::backgrounds::black_and_white;
 use crate::error::{Error, Result};
 use crate::found::{Found, GENERATED_SIZE, ViewCounts, evenly, find};
 use crate::sharp_views::{sampled, sampled_again};
@@ -165,7 +166,8 @@ fn found_views(splats: &Splats) -> ViewCounts {
     ViewCounts { measuring, judging }
 }
 
-/// The views that packing draws: some measure the sensitivity, some judge the result.
+/// The views that packing draws: some measure the sensitivity, some judge the result. About half of each show the scene over black,
+/// the others over white.
 #[derive(Debug, Clone)]
 pub struct PackingViews {
     measuring: Vec<Camera>,
@@ -184,8 +186,7 @@ impl PackingViews {
         let every_second = |first| around.iter().skip(first).step_by(2).cloned();
         let counts = found_views(splats);
         let Found { best, judges } = find(renderer, splats, every_second(1).collect(), counts, progress)?;
-        let measuring = every_second(0).chain(best).collect();
-        Ok(Self { measuring, judging: judges, given: false })
+        Ok(Self::generated_from(every_second(0).chain(best).collect(), judges))
     }
 
     /// Finds views of a part of a scene, whose Gaussians are in the order of a curve: those of [`Self::found`], and [`EVEN_VIEWS`]
@@ -204,6 +205,8 @@ impl PackingViews {
             let views = if k.is_multiple_of(EVEN_JUDGE_SHARE) { &mut judges } else { &mut views.measuring };
             views.push(camera.resized(width, height));
         }
+        black_and_white(&mut views.measuring);
+        black_and_white(&mut judges);
         Ok((views, sampled(judges, PART_JUDGED_PIXELS)))
     }
 
@@ -228,7 +231,13 @@ impl PackingViews {
         measuring.extend(views(&splats.geometry, measuring.len(), width, height));
         // The number differs from that of the measuring views, so that most views are not among those.
         let judging = views(&splats.geometry, JUDGES - 1, width, height);
-        Ok(Self { measuring, judging, given: false })
+        Ok(Self::generated_from(measuring, judging))
+    }
+
+    fn generated_from(mut measuring: Vec<Camera>, mut judging: Vec<Camera>) -> Self {
+        black_and_white(&mut measuring);
+        black_and_white(&mut judging);
+        Self { measuring, judging, given: false }
     }
 
     /// Returns views that an earlier search found.
@@ -249,7 +258,8 @@ impl PackingViews {
         }
         let stride = used.len().div_ceil(MAX_VIEWS);
         let sharp = |camera: &Camera| camera.with_max_width(DEFAULT_MAX_WIDTH);
-        let measuring: Vec<Camera> = used.into_iter().step_by(stride).map(sharp).collect();
+        let mut measuring: Vec<Camera> = used.into_iter().step_by(stride).map(sharp).collect();
+        black_and_white(&mut measuring);
         let judging = measuring.iter().skip(1).step_by(JUDGE_SHARE).cloned().collect();
         Ok(Self { measuring, judging, given: true })
     }
@@ -380,7 +390,9 @@ impl PackingViews {
         let [most, around] = if self.given { [FITTED_GIVEN, FITTED_AROUND] } else { [FITTED_FOUND, 0] };
         let stride = free.len().div_ceil(most).max(1);
         let mut views: Vec<Camera> = free.into_iter().step_by(stride).cloned().collect();
-        views.extend(surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES));
+        let mut around = surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES);
+        black_and_white(&mut around);
+        views.extend(around);
         views.iter_mut().skip(1).step_by(FITTED_HALVED).for_each(|camera| *camera = camera.halved());
         sampled(views, pixels)
     }

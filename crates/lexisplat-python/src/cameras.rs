@@ -37,7 +37,7 @@ impl CameraTuple {
             Some("test") => Some(Split::Test),
             _ => None,
         };
-        Camera { name, width, height, fx, fy, position, rotation, near, split, tiles: None }
+        Camera { name, width, height, fx, fy, position, rotation, near, split, tiles: None, background: None }
     }
 }
 

@@ -49,6 +49,9 @@ pub struct Camera {
     /// The tiles to draw; `None` draws the whole picture. On a GPU sensitivities are measured on the whole picture in
     /// either case.
     pub tiles: Option<TileSet>,
+    /// Colour behind the scene, 0 to 1 a channel. `None` is the background of [`RenderOptions`](crate::RenderOptions) where the
+    /// picture is drawn with options, and black elsewhere.
+    pub background: Option<[f32; 3]>,
 }
 
 impl Camera {
@@ -65,7 +68,25 @@ impl Camera {
     ) -> Self {
         let [fx, fy] = focal.map(single);
         let (position, rotation) = (position.map(single), rotation.map(|row| row.map(single)));
-        Self { name, width, height, fx, fy, position, rotation, near: NEAR_Z, split: None, tiles: None }
+        Self {
+            name,
+            width,
+            height,
+            fx,
+            fy,
+            position,
+            rotation,
+            near: NEAR_Z,
+            split: None,
+            tiles: None,
+            background: None,
+        }
+    }
+
+    /// Returns this camera with another background.
+    #[must_use]
+    pub fn with_background(self, background: impl Into<Option<[f32; 3]>>) -> Self {
+        Self { background: background.into(), ..self }
     }
 
     /// Returns this camera with the near plane at distance `near`, in world units. `None` keeps the near plane.
@@ -188,6 +209,9 @@ impl Camera {
         if let Some(tiles) = &self.tiles {
             tiles.check(self.width, self.height)?;
         }
+        if let Some(background) = self.background.filter(|colour| !colour.iter().all(|v| v.is_finite())) {
+            return Err(Error::parameter("background", format!("{background:?}"), "finite numbers"));
+        }
         if !self.position.iter().all(|v| v.is_finite()) {
             return Err(Error::parameter("position", format!("{:?}", self.position), "finite numbers"));
         }
@@ -226,6 +250,7 @@ pub(crate) fn straight_ahead(width: u32, height: u32, focal: f32) -> Camera {
         near: NEAR_Z,
         split: None,
         tiles: None,
+        background: None,
     }
 }
 
@@ -270,6 +295,7 @@ mod tests {
             ("fx", Camera { fx: 0.0, ..good.clone() }),
             ("fy", Camera { fy: f32::NAN, ..good.clone() }),
             ("near", good.clone().with_near(0.0)),
+            ("background", good.clone().with_background([0.0, f32::NAN, 0.0])),
             ("position", Camera { position: [0.0, f32::INFINITY, 0.0], ..good }),
             ("rotation", scaled),
         ];

@@ -70,7 +70,9 @@ fn random_scenes_are_as_on_the_processor() {
         let cameras = [(150, 100), (7, 5), (333, 41), (150, 100)]
             .iter()
             .zip(0..)
-            .map(|(&(width, height), k)| made::camera(seed + k, width, height))
+            .map(|(&(width, height), k)| {
+                made::camera(seed + k, width, height).with_background((k % 2 == 0).then_some([1.0, 0.5, 0.2]))
+            })
             .collect::<Vec<_>>();
         compare(&gpu, &splats, &cameras);
     }

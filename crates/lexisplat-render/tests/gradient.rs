@@ -61,7 +61,9 @@ fn sample(antialiased: bool) -> (Splats, Vec<(Camera, Image)>) {
         }
         (camera, image)
     };
-    let views = orbit(&splats.geometry, 2, 70, 50).into_iter().map(target).collect();
+    let mut cameras = orbit(&splats.geometry, 2, 70, 50);
+    cameras[1].background = Some([0.9, 0.2, 0.6]);
+    let views = cameras.into_iter().map(target).collect();
     (splats, views)
 }
 

@@ -71,7 +71,8 @@ fn derivatives_are_those_of_the_pictures() {
         g.opacities[i] = g.opacities[i].min(1.0);
         g.dc[i] = g.dc[i].map(|v| v + 2.0);
     }
-    let cameras = surround(&splats.geometry, 3, [96, 64], [2.0, 4.0]);
+    let mut cameras = surround(&splats.geometry, 3, [96, 64], [2.0, 4.0]);
+    cameras[1].background = Some([0.9, 0.1, 0.5]);
     let s = sensitivity(&Scene::from(&splats), &cameras, &Silent).unwrap();
     let of = |predicted: &dyn Fn(usize) -> f32, change: &dyn Fn(&mut Splats, usize, f32)| {
         (0..splats.len())
@@ -149,7 +150,8 @@ fn long_thin_ones_do_not_drown_in_rounding() {
 #[test]
 fn removal_is_what_the_pictures_lose() {
     let splats = scene(&SampleOptions::new(GAUSSIANS, 6));
-    let cameras = surround(&splats.geometry, 2, [96, 64], [2.0, 4.0]);
+    let mut cameras = surround(&splats.geometry, 2, [96, 64], [2.0, 4.0]);
+    cameras[1].background = Some([1.0; 3]);
     let s = sensitivity(&Scene::from(&splats), &cameras, &Silent).unwrap();
     let mut seen = 0;
     for i in 0..splats.len() {

@@ -228,6 +228,7 @@ mod tests {
             near: 0.2,
             split: None,
             tiles: None,
+            background: None,
         };
         CameraController::at(&camera, BOUNDS)
     }

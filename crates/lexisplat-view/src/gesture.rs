@@ -92,6 +92,7 @@ mod tests {
             near: 0.2,
             split: None,
             tiles: None,
+            background: None,
         };
         let mut state = State::new([0.0; 3]);
         state.set_cameras(vec![camera], true, SceneBounds::new(([0.0; 3], 2.0), 0.04, &[]));

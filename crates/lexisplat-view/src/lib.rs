@@ -18,6 +18,7 @@
 //!     near: 0.2,
 //!     split: None,
 //!     tiles: None,
+//!     background: None,
 //! };
 //! let mut state = State::new([0.0; 3]);
 //! state.set_open([true, false]);

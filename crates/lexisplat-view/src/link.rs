@@ -114,6 +114,7 @@ mod tests {
             near: 0.2,
             split: None,
             tiles: None,
+            background: None,
         };
         let mut state = State::new([0.0; 3]);
         state.set_open([true; 2]);

@@ -291,6 +291,7 @@ mod tests {
             near: 0.2,
             split: None,
             tiles: None,
+            background: None,
         };
         View { camera, options: RenderOptions::default(), models: [Some(1), None] }
     }

@@ -283,6 +283,7 @@ mod tests {
             near: 0.2,
             split: None,
             tiles: None,
+            background: None,
         };
         vec![at(0.0), at(1.0), at(2.0)]
     }

@@ -60,6 +60,7 @@ impl View {
             near,
             split: None,
             tiles: None,
+            background: None,
         };
         let options = RenderOptions::default().with_background(background).with_max_degree(max_degree);
         (numbers.len() == NUMBERS).then_some(Self {
@@ -87,6 +88,7 @@ mod tests {
             near: 0.02,
             split: None,
             tiles: None,
+            background: None,
         };
         let options = RenderOptions::default().with_background([0.1, 0.2, 0.3]);
         for (degree, wanted) in [(None, [true, false]), (ShDegree::new(2).ok(), [false, true])] {

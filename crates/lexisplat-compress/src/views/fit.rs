@@ -52,6 +52,7 @@ mod tests {
             near: 0.2,
             split: None,
             tiles: None,
+            background: None,
         }
     }
 

@@ -96,6 +96,7 @@ mod tests {
             near: 0.2,
             split: None,
             tiles: None,
+            background: None,
         };
         names.iter().map(camera).collect()
     }

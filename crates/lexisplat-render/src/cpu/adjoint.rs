@@ -47,7 +47,7 @@ pub struct PictureErrors<const N: usize> {
     pub size_squares: Vec<f32>,
 }
 
-/// The pictures of a scene over black, and their derivatives J by the colours, opacities and sizes of its Gaussians.
+/// The pictures of a scene, and their derivatives J by the colours, opacities and sizes of its Gaussians.
 ///
 /// J covers the pixels in which a Gaussian shows, but not the pixels that the Gaussian reaches only when it grows. In
 /// anti-aliased scenes J ignores that the opacity of a Gaussian on screen depends on its size.
@@ -165,7 +165,7 @@ impl<'a> PictureAdjoint<'a> {
                     simd.dispatch(
                         #[inline(always)]
                         || {
-                            canvas.draw_watched::<false>(splats, list, tile, trace);
+                            canvas.draw_over(splats, list, tile, projection.background(), trace);
                             carry(canvas, trace, tile, &light(canvas, trace, view, tile))
                         },
                     )
@@ -491,7 +491,8 @@ mod tests {
             splats.geometry.dc[i] = splats.geometry.dc[i].map(|v| 0.4 * v);
         }
         let splats = splats.with_degree_cut(lexisplat::ShDegree::ZERO);
-        let cameras = orbit(&splats.geometry, 3, 70, 50);
+        let mut cameras = orbit(&splats.geometry, 3, 70, 50);
+        cameras[1].background = Some([0.4, 0.1, 0.2]);
         (splats, cameras)
     }
 

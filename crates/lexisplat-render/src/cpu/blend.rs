@@ -22,7 +22,7 @@ const FETCHED: usize = 16;
 /// A block that is being drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
-    /// Red, green and blue.
+    /// Red, green and blue. They include the background only after [`Canvas::draw_over`].
     pub(super) colour: [Lanes; 3],
     /// Share of light that splats further back can add. It is 0 once the pixel is finished, and beyond the border of the
     /// picture.
@@ -220,6 +220,27 @@ impl Canvas {
         let Block { colour, transmittance, .. } = &self.blocks[x / SIDE][y / SIDE];
         let lane = y % SIDE * SIDE + x % SIDE;
         std::array::from_fn(|channel| colour[channel][lane] + transmittance[lane] * background[channel])
+    }
+
+    /// Draws like [`Self::draw`], and calls the [`Watch`]. The colours of blocks then include the background.
+    #[inline(always)]
+    pub(super) fn draw_over<'a>(
+        &mut self,
+        splats: &[Splat],
+        list: impl Iterator<Item = &'a [u32]>,
+        tile: Tile,
+        background: [f32; 3],
+        watch: &mut impl Watch,
+    ) {
+        if background == [0.0; 3] {
+            return self.draw_watched::<false>(splats, list, tile, watch);
+        }
+        self.draw_watched::<true>(splats, list, tile, watch);
+        for Block { colour, transmittance, .. } in self.blocks.as_flattened_mut() {
+            for (channel, behind) in colour.iter_mut().zip(background) {
+                channel.iter_mut().zip(&*transmittance).for_each(|(sum, share)| *sum += share * behind);
+            }
+        }
     }
 
     /// Draws like [`Self::draw`], and calls the [`Watch`]. The background is black unless `BACKGROUND` is set.

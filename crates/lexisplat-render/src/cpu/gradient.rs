@@ -68,7 +68,7 @@ pub(super) const SUMS: usize = 9;
 const OF_OPACITY: usize = 3;
 
 impl Differentiator {
-    /// Returns the gradient of the squared errors of the picture of `splats` from `camera` over black. An error is the difference
+    /// Returns the gradient of the squared errors of the picture of `splats` from `camera`. An error is the difference
     /// from `target`, with both clamped to 0 to 1; it is carried back as if the picture were not clamped.
     ///
     /// The gradient covers the pixels in which a Gaussian shows, but not those that it reaches only when it grows.
@@ -96,7 +96,7 @@ impl Differentiator {
                 simd.dispatch(
                     #[inline(always)]
                     || {
-                        canvas.draw_watched::<false>(splats, list, tile, trace);
+                        canvas.draw_over(splats, list, tile, projection.background(), trace);
                         let light = errors(canvas, target, tile);
                         let [x, y] = tile.coordinates();
                         let mut found = summed::<4, SUMS>(

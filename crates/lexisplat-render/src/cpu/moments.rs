@@ -6,6 +6,7 @@ use crate::conventions::TRANSMITTANCE_MIN;
 
 use super::blend::{BLOCKS, Canvas, SIDE, Tile};
 use super::lanes::{LANES, Lanes};
+use super::measured_tiles::Scratch;
 use super::splat::{Root, Splat};
 use super::trace::Trace;
 
@@ -39,21 +40,21 @@ impl Moments {
     }
 }
 
-/// Returns the moments of the splats that show in a tile, with the indices of their Gaussians. `list` has slots of
-/// `splats` from front to back. `canvas` and `trace` are overwritten.
+/// Returns the moments of the splats that show in a tile over `background`, with the indices of their Gaussians. `list` has
+/// slots of `splats` from front to back.
 pub(super) fn tile<'a>(
     simd: Simd,
     splats: &[Splat],
     list: impl Iterator<Item = &'a [u32]>,
     tile: Tile,
-    canvas: &mut Canvas,
-    trace: &mut Trace,
+    background: [f32; 3],
+    Scratch { canvas, trace }: &mut Scratch,
 ) -> Vec<(u32, Moments)> {
     trace.clear();
     simd.dispatch(
         #[inline(always)]
         || {
-            canvas.draw_watched::<false>(splats, list, tile, trace);
+            canvas.draw_over(splats, list, tile, background, trace);
             sum(trace, tile, canvas)
         },
     )
@@ -216,9 +217,9 @@ mod tests {
         let splats = [flat(0, 0.99, 0..16), flat(1, 0.95, 0..16), flat(2, 0.9, 0..8), flat(3, 0.5, 0..16)];
         let list = [0, 1, 2, 3];
         for simd in Simd::available() {
-            let (mut canvas, mut trace) = (Canvas::default(), Trace::default());
+            let mut scratch = Scratch::default();
             let place = Tile::new([0, 0], [TILE; 2]);
-            let found = tile(simd, &splats, list.chunks(4), place, &mut canvas, &mut trace);
+            let found = tile(simd, &splats, list.chunks(4), place, [0.0; 3], &mut scratch);
             let sum = |gaussian| found.iter().find(|(g, _)| *g == gaussian).map_or(0.0, |(_, m)| m.sums[0]);
             assert_eq!(sum(2), 0.0);
             // Half of 256 pixels, each with the square of half the light left.

@@ -73,13 +73,14 @@ impl Painting {
         order.sort(visible);
         stages.end("sort");
         let [width, height] = projection.camera.picture_size();
-        let pixels = vec![options.background; width as usize * height as usize];
+        let background = projection.camera.background.unwrap_or(options.background);
+        let pixels = vec![background; width as usize * height as usize];
         let bands = tiles::bands(order, projection.grid, max_entries).into_iter();
         stages.end("tiles");
         Self {
             bands,
             projection,
-            background: options.background,
+            background,
             image: Image { width, height, pixels },
             done: 0,
             gaussians: order.keys.len(),

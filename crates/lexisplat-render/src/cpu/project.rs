@@ -132,6 +132,11 @@ impl Projection {
         Self { camera, tan, focal, size, w_epsilon, grid, chosen, antialiased, tighten: true }
     }
 
+    /// Returns the colour behind the scene in pictures that are drawn without options.
+    pub(super) fn background(&self) -> [f32; 3] {
+        self.camera.background.unwrap_or_default()
+    }
+
     /// Returns the width and height of the picture, in pixels.
     pub(super) fn size(&self) -> [usize; 2] {
         [self.camera.width as usize, self.camera.height as usize]

@@ -9,13 +9,13 @@ use crate::radiance::Radiance;
 use crate::scene::Scene;
 
 use super::change::carry;
-use super::measured_tiles::{Pool, Scratch, measure_tiles};
+use super::measured_tiles::{Pool, measure_tiles};
 use super::moments::{self, Moments};
 use super::project::Projection;
 use super::workspace::Workspace;
 
-/// Returns the sensitivity of the pictures of `scene` from `cameras`, over black, to each value of each Gaussian,
-/// averaged over the views. Every view has the same weight, whatever its size.
+/// Returns the sensitivity of the pictures of `scene` from `cameras` to each value of each Gaussian, averaged over
+/// the views. Every view has the same weight, whatever its size.
 ///
 /// If every value has an independent small error, the expected mean squared error of the pictures is the sum of the
 /// sensitivities times the squared errors.
@@ -58,8 +58,8 @@ fn measure(
         workspace,
         pool,
         projection,
-        |splats, list, tile, Scratch { canvas, trace }| {
-            moments::tile(simd, splats, list, tile, canvas, trace)
+        |splats, list, tile, scratch| {
+            moments::tile(simd, splats, list, tile, projection.background(), scratch)
         },
         |gaussian, moments| sums[gaussian].add(&moments),
     );

@@ -47,6 +47,7 @@ pub(crate) fn straight(width: u32, height: u32, focal: f32) -> Camera {
         near: 0.2,
         split: None,
         tiles: None,
+        background: None,
     }
 }
 

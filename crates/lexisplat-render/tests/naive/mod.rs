@@ -51,6 +51,8 @@ pub(crate) fn loss(splats: &Splats, camera: &Camera, shown: &[Vec<usize>], targe
             colour += e.colour * alpha * transmittance;
             transmittance *= 1.0 - alpha;
         }
+        let background = DVec3::from_array(camera.background.unwrap_or_default().map(f64::from));
+        colour += transmittance * background;
         let target = DVec3::from_array(target.pixels[p].map(f64::from));
         (colour.clamp(DVec3::ZERO, DVec3::ONE) - target.clamp(DVec3::ZERO, DVec3::ONE)).length_squared()
     };

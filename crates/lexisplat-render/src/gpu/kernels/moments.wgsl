@@ -3,7 +3,7 @@
 //
 // Index of each entry in the lists, where its moments are stored.
 @group(0) @binding(7) var<storage, read> entry_indices: array<u32>;
-// The finished picture over black.
+// The finished picture.
 @group(0) @binding(8) var<storage, read> pixels: array<vec4<f32>>;
 // Moments of each entry. They begin as zeros, and stay zeros for splats that do not show.
 @group(0) @binding(9) var<storage, read_write> moments: array<f32>;
