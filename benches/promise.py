@@ -11,7 +11,7 @@ with its training cameras where it has cameras. `--presets` adds the presets, wh
 
 The example `promise` of lexisplat-eval then scores each file against the original; see there for what views, pictures
 and tiles are. Pictures are as wide as the cameras' own, which the model was trained at, 1,600 pixels at most, unless
-TRAINED says otherwise; on the path they are drawn at half that width too, and 400 pixels wide. The last columns compare
+TRAINED says otherwise; on the path they are drawn over white too, at half that width, and 400 pixels wide. The last columns compare
 sizes at equal reached quality: bytes without cameras over bytes with, of a guess over bytes without cameras, or of a
 refined file over bytes without refining, by the straight line between the logarithms of the bytes of neighbouring files.
 """
@@ -117,9 +117,9 @@ def processor_seconds():
 
 
 def table(rows):
-    print("| scene | width | cameras | asked | reached | off | worst view | worst tile | at half the width | at 400 | "
+    print("| scene | width | cameras | asked | reached | off | worst view | worst tile | over white | at half the width | at 400 | "
           + " | ".join(KINDS) + " | bytes each | ratio | CPU s |")
-    print("|" + "---|" * (13 + len(KINDS)))
+    print("|" + "---|" * (14 + len(KINDS)))
     points = {}
     for r in rows:
         if r["asked"].startswith("psnr"):
@@ -135,7 +135,7 @@ def table(rows):
             ratio = f"{r['bytes'] / other:.2f}" if other else ""
         smaller = [f"{r[f'path_{w}']['mean']:.2f}" for w in r["widths"][1:]] + ["-"]
         print(f"| {r['scene']} | {r['widths'][0]} | {r['cameras']} | {r['asked']} | {path['mean']:.2f} | {path['mean'] - r['aim']:+.2f} | "
-              f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {smaller[0]} | {smaller[1]} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} | {r['cpu_seconds']:.0f} |", flush=True)
+              f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {r['white']['mean']:.2f} | {smaller[0]} | {smaller[1]} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} | {r['cpu_seconds']:.0f} |", flush=True)
 
 
 def main():

@@ -128,7 +128,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         let shown = fit.appearances(Scene::from(&model), quantised.sensitivities(), progress)?;
         drop(model);
         let file = quantised.finish(Some(&shown), None, progress)?;
-        Ok(Refitted { shown: Some(shown), again: None, file })
+        Ok(Refitted { shown: Some(shown), again: None, is_complete: false, file })
     }
 
     /// Fits the pictures of the first layer alone of a file of `quantised`, if it has a first layer. The whole scene stays
@@ -142,12 +142,12 @@ impl<S: Borrow<Splats>> Refitting<S> {
         refitted: Refitted<'_>,
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
-        let Refitted { shown, again, file } = refitted;
-        let (Some(fit), Some(shown)) = (&self.fit, shown) else { return Ok(file) };
+        let Refitted { shown, again, is_complete, file } = refitted;
+        let Some(fit) = self.fit.as_ref().filter(|_| !is_complete) else { return Ok(file) };
         let Some(first) = file.0.first_layer()? else { return Ok(file) };
         drop(file);
         let changes = interim_changes(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
-        Ok(again.as_ref().unwrap_or(quantised).finish(Some(&shown), Some(&changes), progress)?)
+        Ok(again.as_ref().unwrap_or(quantised).finish(shown.as_deref(), Some(&changes), progress)?)
     }
 
     /// Packs at an overall `step`: calls [`Self::quantise`], [`Self::refit`] and [`Self::complete`].
@@ -168,10 +168,12 @@ impl<S: Borrow<Splats>> Refitting<S> {
 
 /// A file with refitted base colours and opacities.
 pub(crate) struct Refitted<'a> {
-    /// The fitted colours and opacities; `None` if nothing is left to fit.
+    /// The fitted colours and opacities; `None` if they are the scene's own.
     shown: Option<Vec<Appearance>>,
     /// The scene with fitted SH-rest, if that was fitted.
     again: Option<Quantised<'a>>,
+    /// Whether nothing is left to fit.
+    is_complete: bool,
     pub(crate) file: (Packed, CompressReport),
 }
 
@@ -196,7 +198,7 @@ fn refined<'a>(
     refining.refine(&mut model, Free::Appearance, appearance, &cost, None, progress)?;
     let shown = appearances(&model.geometry);
     let file = again.finish(Some(&shown), None, progress)?;
-    Ok(Refitted { shown: Some(shown), again: Some(again), file })
+    Ok(Refitted { shown: Some(shown), again: Some(again), is_complete: false, file })
 }
 
 fn appearances(geometry: &Geometry) -> Vec<Appearance> {
@@ -210,7 +212,12 @@ fn appearances(geometry: &Geometry) -> Vec<Appearance> {
 impl Refitted<'_> {
     /// Wraps a file of which nothing is left to fit.
     pub(crate) fn complete(file: (Packed, CompressReport)) -> Self {
-        Self { shown: None, again: None, file }
+        Self { shown: None, again: None, is_complete: true, file }
+    }
+
+    /// Wraps a file with the scene's own colours and opacities. The pictures of its first layer alone are not fitted yet.
+    pub(crate) fn with_own(file: (Packed, CompressReport)) -> Self {
+        Self { shown: None, again: None, is_complete: false, file }
     }
 }
 

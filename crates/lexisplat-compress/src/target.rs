@@ -292,7 +292,7 @@ impl Search {
     /// Packs until a file meets the target closely. `floor` tells whether visible Gaussians keep a least precision. Returns
     /// the value nearest to the target as the inner error if no file meets the target.
     ///
-    /// Refitting takes longer than the rest, and gains about as much at one step as at the next. Files that are not
+    /// A file with the scene's own base colours and opacities is taken where refitting makes it worse. Refitting takes longer than the rest, and gains about as much at one step as at the next. Files that are not
     /// refitted therefore tell at which step to refit one. The gain of that file tells the next step. Of a refined scene the gain
     /// changes with the step, so from the first refined file on the refined files alone tell it.
     fn run(
@@ -341,11 +341,18 @@ impl Search {
                 // count.
                 refitted = Refitted::complete(packer.complete(&quantised, refitted, progress)?);
             }
-            let packed = &refitted.file.0;
-            let (value, score) = match plain {
+            let (mut value, mut score) = match plain {
                 Some(plain) if !packer.refits() => plain,
-                _ => self.value(packed, judge, progress)?,
+                _ => self.value(&refitted.file.0, judge, progress)?,
             };
+            // A fit lessens the errors of all fitted pictures together. The least quality of a view can fall.
+            let is_worse = |plain: &(f64, _)| plain.0 > value && !self.is_size && !packer.refines();
+            let own = plain.filter(is_worse);
+            if let Some(own) = own {
+                refitted = Refitted::with_own(quantised.finish(None, None, progress)?);
+                (value, score) = own;
+            }
+            let packed = &refitted.file.0;
             if let Some((plain, _)) = plain {
                 (gain, is_measured) = (value - plain, true);
             }
@@ -368,7 +375,7 @@ impl Search {
                 if self.is_size { log_step < best.log_step } else { file_bytes < best.file_bytes }
             };
             if met && best.as_ref().is_none_or(is_better) {
-                let complete = self.is_size || is_close || packer.refines();
+                let complete = self.is_size || is_close || packer.refines() || own.is_some();
                 let (packed, report) = match complete {
                     true => packer.complete(&quantised, refitted, progress)?,
                     false => refitted.file,

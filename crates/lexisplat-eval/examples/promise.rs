@@ -2,7 +2,9 @@
 //!
 //! `promise ORIGINAL.ply CAMERAS.json|orbit WIDTH[,WIDTH ...] FILE.lexi ...` prints one JSON object a file. Views are those
 //! marked `test`, else every 8th by name; `orbit` is 12 views from around the scene. They are at most WIDTH pixels wide. The
-//! first width counts for all; at others there are views on the path alone. Each kind of views off the path is made of these: at half and at a quarter of the distance, four times as far, from above, and turned back.
+//! first width counts for all; at others there are views on the path alone. They are over black, and at the first width also over
+//! white. Each kind of views off the path is made of these: at half and at a quarter of the distance, four times as far, from above,
+//! and turned back.
 //! Views that the original covers by less than 5 % do not count. A view's PSNR is at most 60 dB. Tiles are whole
 //! squares of 32 pixels.
 
@@ -32,14 +34,17 @@ type Vector = [f64; 3];
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     Path,
+    /// On the path, over white.
+    White,
     /// At this share of the distance.
     Distance(f64),
     Above,
     Back,
 }
 
-const KINDS: [(&str, Kind); 6] = [
+const KINDS: [(&str, Kind); 7] = [
     ("path", Kind::Path),
+    ("white", Kind::White),
     ("half", Kind::Distance(0.5)),
     ("quarter", Kind::Distance(0.25)),
     ("far", Kind::Distance(4.0)),
@@ -82,7 +87,7 @@ fn moved(camera: &Camera, kind: Kind, distance: f64) -> Camera {
     let [right, down, forward] = [0, 1, 2].map(column);
     let eye = camera.position.map(f64::from);
     let (eye, axes) = match kind {
-        Kind::Path => (eye, [right, down, forward]),
+        Kind::Path | Kind::White => (eye, [right, down, forward]),
         Kind::Distance(share) => {
             let eye = std::array::from_fn(|k| eye[k] + forward[k] * distance * (1.0 - share));
             (eye, [right, down, forward])
@@ -97,7 +102,8 @@ fn moved(camera: &Camera, kind: Kind, distance: f64) -> Camera {
         Kind::Back => (eye, [right.map(|v| -v), down, forward.map(|v| -v)]),
     };
     let rotation = std::array::from_fn(|row| axes.map(|axis| rounded(axis[row])));
-    Camera { position: eye.map(rounded), rotation, ..camera.clone() }
+    let background = matches!(kind, Kind::White).then_some([1.0; 3]);
+    Camera { position: eye.map(rounded), rotation, background, ..camera.clone() }
 }
 
 fn covered(image: &Image) -> f64 {
