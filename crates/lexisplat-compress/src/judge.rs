@@ -39,9 +39,9 @@ struct View {
 }
 
 impl Judge {
-    /// Draws the original `splats` from the cameras `judging`. `renderer` draws the originals and later the models. `given`
-    /// tells whether the cameras were given or generated. Reports [`Stage::Draw`] to `progress`, in views. `progress` can
-    /// cancel.
+    /// Draws the original `splats` from the cameras `judging`, each over its background. `renderer` draws the originals and later
+    /// the models. `given` tells whether the cameras were given or generated. Reports [`Stage::Draw`] to `progress`, in views.
+    /// `progress` can cancel.
     ///
     /// # Errors
     /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene or a

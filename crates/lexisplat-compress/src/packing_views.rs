@@ -201,12 +201,12 @@ impl PackingViews {
         let Some([width, height]) = views.judging.first().map(|camera| [camera.width, camera.height]) else {
             return Ok((views, judges));
         };
-        for (k, camera) in evenly(part, EVEN_VIEWS).into_iter().enumerate() {
+        let mut even = evenly(part, EVEN_VIEWS);
+        black_and_white(&mut even);
+        for (k, camera) in even.into_iter().enumerate() {
             let views = if k.is_multiple_of(EVEN_JUDGE_SHARE) { &mut judges } else { &mut views.measuring };
             views.push(camera.resized(width, height));
         }
-        black_and_white(&mut views.measuring);
-        black_and_white(&mut judges);
         Ok((views, sampled(judges, PART_JUDGED_PIXELS)))
     }
 
@@ -234,6 +234,7 @@ impl PackingViews {
         Ok(Self::generated_from(measuring, judging))
     }
 
+    /// Returns views that were generated, over black and over white.
     fn generated_from(mut measuring: Vec<Camera>, mut judging: Vec<Camera>) -> Self {
         black_and_white(&mut measuring);
         black_and_white(&mut judging);
