@@ -19,7 +19,7 @@ pub(crate) fn black_and_white(cameras: &mut [Camera]) {
     }
 }
 
-/// Returns the colour that is as far from grey as `background`, on the other side.
+/// Returns white for black, and black for white.
 pub(crate) fn opposite(background: [f32; 3]) -> [f32; 3] {
     background.map(|v| 1.0 - v)
 }
@@ -72,7 +72,7 @@ mod tests {
             let quality = over_white(&splats, &packed);
             assert!(quality > 32.0, "{quality} {}", packed.len());
         }
-        // A part alone is not left out either, since others may be behind it.
+        // They also stay in a part, since other parts may be behind it.
         let observed = observe(&mut Renderer::cpu(), &splats, &options, 40.0, &Silent).unwrap();
         let packer = Packer::new(&splats, &observed.sensitivity, &options).unwrap();
         let packed = packer.pack(observed.step_factor * packer.step_for(40.0), &Silent).unwrap().0;

@@ -16,8 +16,8 @@ const STEPS_PER_OCTAVE: f64 = 2.0;
 const MOST_FILES: usize = 4;
 /// Views that are evenly spread over a part may show less than views like photographs by this many decibels.
 const EVEN_MARGIN: f64 = 1.0;
-/// Factor on the amount by which a file falls short, beside the amount by which another one exceeds. People do not see that a scene
-/// lost quality before they look at it.
+/// Factor on the amount by which a file falls short of the quality, beside the amount by which another one exceeds it. A loss that
+/// nobody asked for is worse than bytes that nobody needs.
 const SHORT_WEIGHT: f64 = 2.0;
 /// Largest change of the binary logarithm of the step after one file.
 const MOST_MOVE: f64 = 2.0;

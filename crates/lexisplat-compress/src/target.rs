@@ -292,9 +292,10 @@ impl Search {
     /// Packs until a file meets the target closely. `floor` tells whether visible Gaussians keep a least precision. Returns
     /// the value nearest to the target as the inner error if no file meets the target.
     ///
-    /// A file with the scene's own base colours and opacities is taken where refitting makes it worse. Refitting takes longer than the rest, and gains about as much at one step as at the next. Files that are not
+    /// Refitting takes longer than the rest, and gains about as much at one step as at the next. Files that are not
     /// refitted therefore tell at which step to refit one. The gain of that file tells the next step. Of a refined scene the gain
-    /// changes with the step, so from the first refined file on the refined files alone tell it.
+    /// changes with the step, so from the first refined file on the refined files alone tell it. A file is taken without
+    /// refitting where refitting makes it worse.
     fn run(
         &self,
         packer: &Refitting<impl Borrow<Splats>>,

@@ -183,7 +183,7 @@ impl Renderer {
         if let (Some((_, renderer)), Some(scene)) = (&mut self.gpu, &prepared.gpu) {
             let whole = renderer.render_async(scene, camera, options).await?.0;
             return Ok(match &camera.tiles {
-                Some(set) => set.cut(&whole, camera.background.unwrap_or(options.background)),
+                Some(set) => set.cut(&whole, options.behind(camera)),
                 None => whole,
             });
         }

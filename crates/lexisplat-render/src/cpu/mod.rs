@@ -71,6 +71,11 @@ impl RenderOptions {
         Self { background, ..self }
     }
 
+    /// Returns the colour behind the scene in a picture from `camera`.
+    pub(crate) fn behind(&self, camera: &Camera) -> [f32; 3] {
+        camera.background.unwrap_or(self.background)
+    }
+
     /// Returns these options with another highest SH degree; `None` draws all degrees of the scene.
     #[must_use]
     pub fn with_max_degree(self, max_degree: Option<ShDegree>) -> Self {

@@ -73,7 +73,7 @@ impl Painting {
         order.sort(visible);
         stages.end("sort");
         let [width, height] = projection.camera.picture_size();
-        let background = projection.camera.background.unwrap_or(options.background);
+        let background = options.behind(&projection.camera);
         let pixels = vec![background; width as usize * height as usize];
         let bands = tiles::bands(order, projection.grid, max_entries).into_iter();
         stages.end("tiles");

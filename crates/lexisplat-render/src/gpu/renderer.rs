@@ -481,7 +481,7 @@ fn frame_uniform(
         rows: shape.rows,
         position: camera.position,
         antialiased: scene.antialiased.into(),
-        background: camera.background.unwrap_or(options.background),
+        background: options.behind(camera),
         slots: capacity.slots,
         tangents: [size[0] / (2.0 * camera.fx), size[1] / (2.0 * camera.fy)],
         focal: [camera.fx, camera.fy],
