@@ -238,7 +238,7 @@ impl PackingViews {
     fn generated_from(mut measuring: Vec<Camera>, mut judging: Vec<Camera>) -> Self {
         black_and_white(&mut measuring);
         black_and_white(&mut judging);
-        Self { measuring, judging, given: false }
+        Self::of_found(measuring, judging)
     }
 
     /// Returns views that an earlier search found.

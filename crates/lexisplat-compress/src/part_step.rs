@@ -24,10 +24,10 @@ const MOST_MOVE: f64 = 2.0;
 
 /// Returns the factor on the usual step with which pictures of `part` have a PSNR of about `decibels`.
 ///
-/// The part is packed as a scene of its own, with its `sensitivity`. The views `judging`, which are like photographs, and the views
-/// `even`, which are evenly spread over the part, score a file. The score at one step gives the next step, until that step was tried before. The step of the file whose score is nearest to `decibels` is chosen; falling short counts
-/// [`SHORT_WEIGHT`] times. No
-/// file is refitted: [`GAIN_FOUND`] stands for the gain of refitting. With a second file that is refitted, and steps of
+/// The part is packed as a scene of its own, with its `sensitivity`. The views `judging`, which are like photographs, and the
+/// views `even`, which are evenly spread over the part, score a file. The score at one step gives the next step, until that step
+/// was tried before. The step of the file whose score is nearest to `decibels` is chosen; falling short counts [`SHORT_WEIGHT`]
+/// times. No file is refitted: [`GAIN_FOUND`] stands for the gain of refitting. With a second file that is refitted, and steps of
 /// quarter octaves, three copies of room-large in five parts had the same steps, in 27 % more time.
 ///
 /// # Errors
