@@ -35,7 +35,7 @@ mod tests {
     use super::*;
     use crate::Judge;
     use crate::packing_views::Looked;
-    use crate::parts::observe;
+    use crate::parts::Parts;
     use crate::refit::{Fit, Refitting};
     use crate::views::Viewpoints;
 
@@ -73,7 +73,8 @@ mod tests {
             assert!(quality > 32.0, "{quality} {}", packed.len());
         }
         // They also stay in a part, since other parts may be behind it.
-        let observed = observe(&mut Renderer::cpu(), &splats, &options, 40.0, &Silent).unwrap();
+        let parts = Parts { options: &options, decibels: 40.0, refine: None, gaussians: splats.len() };
+        let observed = parts.observe(&mut Renderer::cpu(), &splats, &Silent).unwrap().0;
         let packer = Packer::new(&splats, &observed.sensitivity, &options).unwrap();
         let packed = packer.pack(observed.step_factor * packer.step_for(40.0), &Silent).unwrap().0;
         let quality = over_white(&splats, &packed.unpack().unwrap().into_splats());

@@ -84,6 +84,14 @@ impl Refine {
         }
     }
 
+    /// Returns the effort for a part of `part` Gaussians of a scene of `gaussians` Gaussians. All parts together take the minutes.
+    pub(crate) fn of_part(self, part: usize, gaussians: usize) -> Self {
+        match self {
+            Self::Minutes(minutes) => Self::Minutes(minutes * part as f64 / gaussians.max(1) as f64),
+            other => other,
+        }
+    }
+
     /// Returns the numbers of steps for views of `pixels` pixels each and a scene of `gaussians` Gaussians.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 1 and `MOST`")]
     pub(crate) fn steps(self, pixels: f64, gaussians: usize) -> RefineSteps {
@@ -124,5 +132,7 @@ mod tests {
         assert_eq!(of(1e-12), RefineSteps { all: 1, radiance: 1, appearance: 1 });
         assert!(of(1e-12).below() < of(1e9).below());
         assert_eq!(of(1e300).all, 10_000_000);
+        assert_eq!(Refine::Minutes(4.0).of_part(100, 400), Refine::Minutes(1.0));
+        assert_eq!(Refine::Quick.of_part(100, 400), Refine::Quick);
     }
 }

@@ -166,6 +166,12 @@ fn found_views(splats: &Splats) -> ViewCounts {
     ViewCounts { measuring, judging }
 }
 
+/// Returns the found views, and rounds of views near them. Of sharp pictures only some squares are drawn.
+fn rounds_nearby(splats: &Splats, found: Vec<Camera>) -> Vec<Camera> {
+    let rounds = nearby(&splats.geometry, &found, REFINED_NEARBY);
+    std::iter::once(found).chain(rounds).flat_map(|round| sampled(round, REFINED_PIXELS)).collect()
+}
+
 /// The views that packing draws: some measure the sensitivity, some judge the result. About half of each show the scene over black,
 /// the others over white.
 #[derive(Debug, Clone)]
@@ -374,15 +380,15 @@ impl PackingViews {
         fitted.extend(self.measuring.iter().filter(|camera| !self.judging.contains(camera)).cloned());
         let fitted = match self.given {
             true => sampled_again(fitted, REFINED_PIXELS, MOST_REFINED_PIXELS),
-            false => {
-                let rounds = nearby(&splats.geometry, &fitted, REFINED_NEARBY);
-                std::iter::once(fitted)
-                    .chain(rounds)
-                    .flat_map(|round| sampled(round, REFINED_PIXELS))
-                    .collect()
-            }
+            false => rounds_nearby(splats, fitted),
         };
         Ok((self, fitted))
+    }
+
+    /// Returns the views to which everything of a part of a scene is fitted, like [`Self::for_refining`] of found views.
+    pub(crate) fn refined_part(&self, part: &Splats) -> Vec<Camera> {
+        let fitted = self.measuring.iter().filter(|camera| !self.judging.contains(camera));
+        rounds_nearby(part, fitted.cloned().collect())
     }
 
     fn fitting_to(&self, splats: &Splats, pixels: u64) -> Vec<Camera> {

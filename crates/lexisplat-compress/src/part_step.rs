@@ -1,12 +1,11 @@
 //! The quantisation step that a part of a scene needs.
 
-use lexisplat::packed::{PackOptions, Packer};
-use lexisplat::{Progress, Sensitivity, Splats};
-use lexisplat_render::{Camera, Renderer};
+use lexisplat::packed::Packer;
+use lexisplat::{Progress, Splats};
+use lexisplat_render::{Camera, Renderer, Scene};
 
-use crate::error::Result;
-use crate::judge::Judge;
-use crate::refit::GAIN_FOUND;
+use crate::error::{Error, Result};
+use crate::judge::{Judge, Score};
 use crate::target::{DB_PER_HALVING, Try, on_grid};
 
 /// Number of steps in an octave. Scores of one small scene in two units differ by up to 1 dB, which is a fifth of an
@@ -22,44 +21,73 @@ const SHORT_WEIGHT: f64 = 2.0;
 /// Largest change of the binary logarithm of the step after one file.
 const MOST_MOVE: f64 = 2.0;
 
-/// Returns the factor on the usual step with which pictures of `part` have a PSNR of about `decibels`.
+/// The views that judge a part of a scene.
+pub(crate) struct PartJudge {
+    /// The views like photographs, and the views evenly spread over the part, with the amount by which these may show less.
+    judges: Vec<(Judge, f64)>,
+}
+
+impl PartJudge {
+    /// Draws `part` from the views `judging`, which are like photographs, and from the views `even`, which are evenly spread over
+    /// the part. The processor draws, also if a GPU measured the sensitivity.
+    ///
+    /// # Errors
+    /// As [`Judge::new`].
+    pub(crate) fn new(
+        part: &Splats,
+        [judging, even]: [&[Camera]; 2],
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let of = |views: &[Camera]| Judge::of_part(Renderer::cpu(), part, views, progress);
+        let mut judges = vec![(of(judging)?, 0.0)];
+        if !even.is_empty() {
+            judges.push((of(even)?, EVEN_MARGIN));
+        }
+        Ok(Self { judges })
+    }
+
+    /// Returns the lower of the scores.
+    ///
+    /// # Errors
+    /// As [`Judge::score`].
+    pub(crate) fn score<'a>(
+        &mut self,
+        scene: impl Into<Scene<'a>>,
+        progress: &dyn Progress,
+    ) -> Result<Score> {
+        let scene = scene.into();
+        let mut least: Option<Score> = None;
+        for (judge, margin) in &mut self.judges {
+            let Score { judged, mean, least: worst } = judge.score(scene, progress)?;
+            let own = Score { judged: judged + *margin, mean: mean + *margin, least: worst + *margin };
+            least = Some(least.filter(|other| other.judged <= own.judged).unwrap_or(own));
+        }
+        least.ok_or_else(|| Error::parameter("views", 0, "at least one that judges"))
+    }
+}
+
+/// Returns the overall step with which a file of `packer`, which packs a part of a scene, has about `decibels` dB by `judge` before
+/// it is refitted. The search begins at step `begin`.
 ///
-/// The part is packed as a scene of its own, with its `sensitivity`. The views `judging`, which are like photographs, and the
-/// views `even`, which are evenly spread over the part, score a file. The score at one step gives the next step, until that step
-/// was tried before. The step of the file whose score is nearest to `decibels` is chosen; falling short counts [`SHORT_WEIGHT`]
-/// times. No file is refitted: [`GAIN_FOUND`] stands for the gain of refitting. With a second file that is refitted, and steps of
-/// quarter octaves, three copies of room-large in five parts had the same steps, in 27 % more time.
+/// The score at one step gives the next step, until that step was tried before. The step of the file whose score is nearest to
+/// `decibels` is chosen; falling short counts [`SHORT_WEIGHT`] times. With a second file that is refitted, and steps of quarter
+/// octaves, three copies of room-large in five parts had the same steps, in 27 % more time.
 ///
 /// # Errors
 /// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-pub(crate) fn step_factor(
-    part: &Splats,
-    [judging, even]: [&[Camera]; 2],
-    sensitivity: &Sensitivity,
-    options: &PackOptions,
+pub(crate) fn part_step(
+    packer: &Packer<&Splats>,
+    judge: &mut PartJudge,
+    begin: f64,
     decibels: f64,
     progress: &dyn Progress,
 ) -> Result<f64> {
-    let packer = Packer::new(part, sensitivity, options)?;
-    let usual = libm::log2(packer.step_for(decibels));
-    let gain = if options.may_change() { GAIN_FOUND } else { 0.0 };
-    // The processor judges, also if a GPU measured the sensitivity.
-    let judge_of = |views: &[Camera]| Judge::of_part(Renderer::cpu(), part, views, progress);
-    let mut judges = vec![(judge_of(judging)?, 0.0)];
-    if !even.is_empty() {
-        judges.push((judge_of(even)?, EVEN_MARGIN));
-    }
-    let mut log_step = on_grid(usual, STEPS_PER_OCTAVE);
+    let mut log_step = on_grid(libm::log2(begin), STEPS_PER_OCTAVE);
     let mut tries: Vec<Try> = Vec::with_capacity(MOST_FILES);
     while tries.len() < MOST_FILES {
         let (file, _) =
             packer.quantise(libm::exp2(log_step), true, progress)?.finish(None, None, progress)?;
-        let unpacked = file.unpack()?;
-        let mut least = f64::NAN;
-        for (judge, margin) in &mut judges {
-            least = least.min(judge.score(&unpacked, progress)?.judged + *margin);
-        }
-        let value = least + gain;
+        let value = judge.score(&file.unpack()?, progress)?.judged;
         tries.push(Try { log_step, value });
         let by = ((value - decibels) / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE);
         let next = on_grid(log_step + by, STEPS_PER_OCTAVE);
@@ -70,23 +98,24 @@ pub(crate) fn step_factor(
     }
     let off = |t: &Try| (t.value - decibels).max(SHORT_WEIGHT * (decibels - t.value));
     let nearest = tries.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-    let log_step = nearest.map_or(log_step, |t| t.log_step);
-    Ok(libm::exp2(log_step - usual))
+    Ok(libm::exp2(nearest.map_or(log_step, |t| t.log_step)))
 }
 
 #[cfg(test)]
 mod tests {
-    use lexisplat::Silent;
+    use lexisplat::packed::PackOptions;
+    use lexisplat::{Sensitivity, Silent};
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
-    use crate::parts::observe;
+    use crate::parts::Parts;
 
     #[test]
     fn the_step_is_smaller_where_more_is_asked_and_may_change_less() {
         let part = scene(&SampleOptions::new(1500, 3));
         let factor = |options: PackOptions, decibels: f64| {
-            observe(&mut Renderer::cpu(), &part, &options, decibels, &Silent).unwrap().step_factor
+            let parts = Parts { options: &options, decibels, refine: None, gaussians: part.len() };
+            parts.observe(&mut Renderer::cpu(), &part, &Silent).unwrap().0.step_factor
         };
         let usual = factor(PackOptions::default(), 40.0);
         assert!(usual > 0.02 && usual < 50.0, "{usual}");

@@ -6,7 +6,7 @@ use lexisplat::{Sensitivity, Splats};
 use crate::effort::RefineSteps;
 use crate::error::{Error, Result};
 use crate::fewer::Removal;
-use crate::judge::{Judge, Score};
+use crate::judge::Score;
 use crate::packing::{Packing, Quality};
 use crate::refine::{Free, Refining, RestCost};
 use crate::report::RefineReport;
@@ -42,7 +42,8 @@ pub(crate) struct Reduced {
 
 impl Packing {
     /// Removes and merges Gaussians of `splats` until the rest shows about the quality asked for, or can have about the size
-    /// asked for. Then fits the rest to `refining`. `sensitivity` is the sensitivity of `splats`, and `source_bytes` the size of the source.
+    /// asked for. Then fits the rest to `refining`. `sensitivity` is the sensitivity of `splats`, `score` scores scenes over the
+    /// views that judge, and `source_bytes` is the size of the source.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -52,10 +53,10 @@ impl Packing {
         sensitivity: Sensitivity,
         removal: &mut Removal<'_>,
         refining: &Refining,
-        judge: &mut Judge,
+        score: &mut dyn FnMut(&Splats) -> Result<Score>,
         source_bytes: u64,
     ) -> Result<Reduced> {
-        let progress = removal.progress;
+        let given = removal.views.are_given();
         let (decibels, least) = match self.quality {
             Quality::Target(target @ (Target::Size(_) | Target::Ratio(_))) => {
                 let bytes = target.bytes(source_bytes);
@@ -66,14 +67,14 @@ impl Packing {
                 )]
                 let most = (bytes / BYTES_EACH).ceil() as usize;
                 let made = removal.at_most(most.max(1), splats, sensitivity)?;
-                return self.fitted(made, removal, refining, judge, SIZE_DB);
+                return self.fitted(made, removal, refining, score, SIZE_DB);
             }
             Quality::Target(Target::MinPsnr(decibels)) => (decibels, true),
             Quality::Target(target) => (target.asked(), false),
             Quality::Preset(preset) => (preset.decibels(), false),
         };
         let value = |score: Score| if least { score.least } else { score.judged };
-        let (first, more) = match judge.views_are_given() {
+        let (first, more) = match given {
             true => (refining.steps.below(), &NEXT_BELOW_GIVEN[..]),
             false => (BELOW_FOUND, &[][..]),
         };
@@ -82,19 +83,18 @@ impl Packing {
             let below = tries.next();
             let made = match below {
                 Some(below) => {
-                    let quality =
-                        &mut |splats: &Splats| Ok::<_, Error>(value(judge.score(splats, progress)?));
+                    let quality = &mut |splats: &Splats| Ok::<_, Error>(value(score(splats)?));
                     removal.down_to(decibels - below, splats, sensitivity.clone(), quality)?
                 }
                 None => (splats.clone(), sensitivity.clone()),
             };
-            let fitted = self.fitted(made, removal, refining, judge, decibels)?;
+            let fitted = self.fitted(made, removal, refining, score, decibels)?;
             let reached = value(fitted.score);
             if below.is_none() || reached >= decibels + ABOVE {
                 let share = match self.quality {
                     // The file is judged beside the reduced scene, and fitted to the pictures of the original.
                     Quality::Preset(_) if self.max_gaussians.is_some() => 0.0,
-                    _ if judge.views_are_given() => GAIN_GIVEN,
+                    _ if given => GAIN_GIVEN,
                     _ => GAIN_FOUND,
                 };
                 return Ok(Reduced { gain: share * (reached - decibels), ..fitted });
@@ -108,19 +108,19 @@ impl Packing {
         (mut splats, sensitivity): (Splats, Sensitivity),
         removal: &mut Removal<'_>,
         refining: &Refining,
-        judge: &mut Judge,
+        score: &mut dyn FnMut(&Splats) -> Result<Score>,
         decibels: f64,
     ) -> Result<Reduced> {
         let progress = removal.progress;
         let RefineSteps { all, .. } = refining.steps;
-        let before = judge.score(&splats, progress)?;
+        let before = score(&splats)?;
         // The step is that of all pictures, and with found views only the hardest of them judge.
         let all_pictures = decibels + before.mean - before.judged;
         let step = Packer::new(&splats, &sensitivity, &self.options)?.step_for(all_pictures);
         let cost = RestCost::new(sensitivity.colour.iter().copied(), step);
         let shares = refining.shares(&splats, &sensitivity, before.mean);
         refining.refine(&mut splats, Free::All, all, &cost, Some(&shares), progress)?;
-        let score = judge.score(&splats, progress)?;
+        let score = score(&splats)?;
         let report = RefineReport {
             steps: all,
             gaussians: splats.len(),

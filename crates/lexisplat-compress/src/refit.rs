@@ -123,7 +123,11 @@ impl<S: Borrow<Splats>> Refitting<S> {
         let model = file.0.unpack()?;
         drop(file);
         if let Some(refining) = &self.refining {
-            return refined(refining, step, quantised, model.into_splats(), progress);
+            let cost = RestCost::new(quantised.sensitivities().iter().map(|s| s.colour), step);
+            let mut again = quantised.clone();
+            let shown = refined(refining, &mut again, model.into_splats(), &cost, progress)?;
+            let file = again.finish(Some(&shown), None, progress)?;
+            return Ok(Refitted { shown: Some(shown), again: Some(again), is_complete: false, file });
         }
         let shown = fit.appearances(Scene::from(&model), quantised.sensitivities(), progress)?;
         drop(model);
@@ -178,27 +182,27 @@ pub(crate) struct Refitted<'a> {
 }
 
 /// Fits the SH-rest, the base colours and the opacities of `model`, a file of `quantised`, codes the SH-rest, and then fits
-/// base colours and opacities once more.
-fn refined<'a>(
+/// base colours and opacities once more, which are the result.
+///
+/// # Errors
+/// Errors of packing and drawing.
+pub(crate) fn refined(
     refining: &Refining,
-    step: f64,
-    quantised: &Quantised<'a>,
+    quantised: &mut Quantised<'_>,
     mut model: Splats,
+    cost: &RestCost,
     progress: &dyn Progress,
-) -> Result<Refitted<'a>> {
+) -> Result<Vec<Appearance>> {
     let RefineSteps { radiance, appearance, .. } = refining.steps;
-    let cost = RestCost::new(quantised.sensitivities().iter().map(|s| s.colour), step);
-    refining.refine(&mut model, Free::Radiance, radiance, &cost, None, progress)?;
-    let again = quantised.with_sh_rest(&model.sh_rest, progress)?;
+    refining.refine(&mut model, Free::Radiance, radiance, cost, None, progress)?;
+    quantised.set_sh_rest(&model.sh_rest, progress)?;
     let shown = appearances(&model.geometry);
-    let mut model = again.finish(Some(&shown), None, progress)?.0.unpack()?.into_splats();
+    let mut model = quantised.finish(Some(&shown), None, progress)?.0.unpack()?.into_splats();
     for (i, shown) in shown.into_iter().enumerate() {
         shown.give(&mut model.geometry, i);
     }
-    refining.refine(&mut model, Free::Appearance, appearance, &cost, None, progress)?;
-    let shown = appearances(&model.geometry);
-    let file = again.finish(Some(&shown), None, progress)?;
-    Ok(Refitted { shown: Some(shown), again: Some(again), is_complete: false, file })
+    refining.refine(&mut model, Free::Appearance, appearance, cost, None, progress)?;
+    Ok(appearances(&model.geometry))
 }
 
 fn appearances(geometry: &Geometry) -> Vec<Appearance> {

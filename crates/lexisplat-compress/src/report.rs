@@ -114,7 +114,8 @@ pub fn overshoot(target: &TargetRecord) -> Option<f64> {
     (target.kind == MIN_PSNR && above > MUCH_ABOVE).then_some(above)
 }
 
-/// The result of refining, before quantisation.
+/// The result of refining, before quantisation. Of a scene in parts, numbers are sums over the parts, and decibels are means over
+/// the Gaussians.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct RefineReport {
@@ -126,6 +127,21 @@ pub struct RefineReport {
     pub before_psnr: f64,
     /// Judged PSNR of their pictures after the fit, in dB.
     pub after_psnr: f64,
+}
+
+impl RefineReport {
+    /// Adds the result of the next part.
+    pub(crate) fn with_part(self, next: Self) -> Self {
+        let gaussians = self.gaussians + next.gaussians;
+        let share = next.gaussians as f64 / gaussians.max(1) as f64;
+        let mean = |before: f64, own: f64| before + share * (own - before);
+        Self {
+            steps: self.steps + next.steps,
+            gaussians,
+            before_psnr: mean(self.before_psnr, next.before_psnr),
+            after_psnr: mean(self.after_psnr, next.after_psnr),
+        }
+    }
 }
 
 /// Origin of the sensitivity of a scene.

@@ -72,7 +72,7 @@ impl Compression {
                 CompressionReport::exact(done, Layout::of(*codes, options.values))
             }
             Self::Guessed(preset, options) => {
-                in_parts(options, preset.decibels(), None, source, sink, progress)?
+                in_parts(options, preset.decibels(), None, None, source, sink, progress)?
             }
             Self::Packed(packing) => packing.run(source, sink, progress)?,
         };
@@ -122,7 +122,8 @@ impl Packing {
         progress: &dyn Progress,
     ) -> Result<CompressionReport> {
         let source = WithView::best(source, progress)?;
-        in_parts(&self.options, self.decibels()?, Some(self.renderer()?), &source, sink, progress)
+        let renderer = Some(self.renderer()?);
+        in_parts(&self.options, self.decibels()?, self.refine, renderer, &source, sink, progress)
     }
 
     /// Returns the given cameras, or else likely cameras that seem to belong to `splats`.
@@ -208,7 +209,8 @@ impl Packing {
                 let mut judge = judge.of_refined(true);
                 let start = fewer.as_ref().unwrap_or(&splats);
                 let bytes = source.source_bytes();
-                let made = self.reduced(start, sensitivity, &mut removal, &to, &mut judge, bytes)?;
+                let score = &mut |splats: &Splats| judge.score(splats, progress);
+                let made = self.reduced(start, sensitivity, &mut removal, &to, score, bytes)?;
                 refining = Some((to, made.gain));
                 (fewer, sensitivity, refined) = (Some(made.splats), made.sensitivity, Some(made.report));
             }

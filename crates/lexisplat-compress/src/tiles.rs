@@ -1,16 +1,17 @@
 //! The steps of [`lexisplat::packed::tiles`] that draw.
 
-use lexisplat::packed::Preset;
+use lexisplat::Progress;
 use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
-use lexisplat::{AppearanceSensitivity, Model, Progress, Splats};
+use lexisplat::packed::{Preset, ToRefit};
 use lexisplat_render::Renderer;
 
+use crate::effort::Refine;
 use crate::error::Result;
-use crate::parts;
+use crate::parts::Parts;
 pub use crate::parts::in_parts;
 
-/// Measures the sensitivity of a bucket with `renderer`, for the quality that `preset` aims at. Without a renderer the
-/// sensitivity is guessed from each Gaussian alone.
+/// Measures the sensitivity of a bucket with `renderer`, for the quality that `preset` aims at, and refines its Gaussians if there
+/// is `refine`. Without a renderer the sensitivity is guessed from each Gaussian alone.
 ///
 /// # Errors
 /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the bucket does not
@@ -20,15 +21,17 @@ pub fn look(
     bucket: &Bucket,
     renderer: Option<&mut Renderer>,
     preset: Preset,
+    refine: Option<Refine>,
     progress: &dyn Progress,
 ) -> Result<(LookStatistics, Looked)> {
-    let (part, options) = (bucket.splats(), plan.options());
-    let observe = |renderer| parts::observe(renderer, part, options, preset.decibels(), progress);
+    let parts = parts(plan, preset, refine);
+    let observe = |renderer| parts.observe(renderer, bucket.splats(), progress);
     let observed = renderer.map(observe).transpose()?;
-    Ok(bucket.look(plan, observed)?)
+    Ok(bucket.look(plan, observed.map(|(observed, _)| observed))?)
 }
 
-/// Codes a bucket. If its sensitivity was not `guessed`, base colours and opacities are fitted to pictures.
+/// Codes a bucket. With `drawn`, its sensitivity was measured by pictures for `preset`, and the file is fitted to pictures: base
+/// colours and opacities, and with `refine` SH-rest.
 ///
 /// # Errors
 /// As [`Coding::code`], and errors of drawing.
@@ -37,11 +40,19 @@ pub fn code(
     coding: &Coding,
     bucket: &Bucket,
     looked: &Looked,
-    guessed: bool,
+    drawn: Option<Preset>,
+    refine: Option<Refine>,
     progress: &dyn Progress,
 ) -> Result<(Counts, Coded)> {
-    let mut refit = |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| {
-        parts::refit(part, model, own, looked.memo(), progress).map(Some)
+    let Some(preset) = drawn else {
+        return coding.code(plan, bucket, looked, None, progress);
     };
-    coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut refit) }, progress)
+    let parts = parts(plan, preset, refine);
+    let mut refit = |of: ToRefit<'_, '_>| parts.refit(of, progress).map(Some);
+    coding.code(plan, bucket, looked, Some(&mut refit), progress)
+}
+
+fn parts(plan: &Plan, preset: Preset, refine: Option<Refine>) -> Parts<'_> {
+    let (options, gaussians) = (plan.options(), plan.len());
+    Parts { options, decibels: preset.decibels(), refine, gaussians }
 }

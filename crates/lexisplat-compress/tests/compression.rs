@@ -89,6 +89,10 @@ fn refined_files_are_smaller() {
     let brief = Refine::Minutes(0.002);
     let (_, report) = run(packing(Target::MinPsnr(26.0).into()).with_refine(brief), &splats);
     assert!(report.reached.unwrap().min_psnr >= 26.0);
+    let (_, report) = run(Packing::new(target).with_memory(1000).with_refine(brief), &splats);
+    let refined = report.refined.unwrap();
+    assert!(report.in_parts && refined.steps > 1 && report.gaussians <= refined.gaussians, "{refined:?}");
+    assert_eq!(report.removed, (splats.len() - report.gaussians) as u64);
     let of = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let sized = packing(Target::Size(6000).into()).with_refine(brief);

@@ -70,6 +70,19 @@ fn made(choices: &[Named]) -> Option<&'static str> {
     choices.iter().find(|choice| choice.1).map(|choice| choice.0)
 }
 
+/// Returns an error if a choice of each list was made.
+pub(crate) fn refuse(a: &[Named], b: &[Named]) -> Result<()> {
+    match (made(a), made(b)) {
+        (Some(a), Some(b)) => Err(Error::parameter(b, "given", format!("not together with {a}"))),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the effort of refining: `quick`, `thorough` or minutes.
+pub(crate) fn effort(refine: Option<&str>) -> Result<Option<Refine>> {
+    refine.map(str::parse).transpose()
+}
+
 impl Choices {
     /// Returns the choices that only layouts with exact geometry have.
     fn exact_only(&self, has_dictionary: bool) -> [Named; 4] {
@@ -108,10 +121,6 @@ impl Choices {
 
     /// Returns an error for choices that do not go together.
     fn check(&self, has_dictionary: bool) -> Result<()> {
-        let refuse = |a: &[Named], b: &[Named]| match (made(a), made(b)) {
-            (Some(a), Some(b)) => Err(Error::parameter(b, "given", format!("not together with {a}"))),
-            _ => Ok(()),
-        };
         let goals = self.goals();
         (1..goals.len()).try_for_each(|k| refuse(&goals[..k], &goals[k..=k]))?;
         let [_, psnr, min_psnr, size, ratio] = goals;
@@ -150,7 +159,7 @@ impl Choices {
             .with_gpu(device.open_gpu()?)
             .with_viewpoints(self.views.as_deref().map_or(Ok(Viewpoints::Auto), views)?)
             .with_max_gaussians(self.max_gaussians)
-            .with_refine(self.refine.as_deref().map(str::parse::<Refine>).transpose()?);
+            .with_refine(effort(self.refine.as_deref())?);
         if let Some(bytes) = self.memory {
             packing = packing.with_memory(bytes);
         }

@@ -10,7 +10,7 @@ use lexisplat::packed::tiles::{
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Joined, Silent, SplatSource, Splats};
-use lexisplat_compress::{CompressionReport, Error, tiles};
+use lexisplat_compress::{CompressionReport, Error, Refine, tiles};
 use lexisplat_render::{Device, Renderer};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -18,7 +18,7 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::arrays::from_python;
 use crate::bytes::Given;
-use crate::choices::{pack_options, preset};
+use crate::choices::{effort, pack_options, preset, refuse};
 use crate::draw::device;
 use crate::errors::{Result, raise};
 use crate::files::{json, output, read_options, with_source};
@@ -80,6 +80,8 @@ pub(crate) struct Choices {
     keep_order: bool,
     keep_all: bool,
     lod: bool,
+    /// `quick`, `thorough` or minutes.
+    refine: Option<String>,
     guess: bool,
     device: String,
     drop_invalid: bool,
@@ -93,6 +95,10 @@ impl Choices {
 
     fn options(&self) -> PackOptions {
         pack_options(self.tol, self.atoms, self.keep_order, self.keep_all, self.lod, self.seed)
+    }
+
+    fn effort(&self) -> Result<Option<Refine>> {
+        effort(self.refine.as_deref())
     }
 
     fn preset(&self) -> Result<Preset> {
@@ -305,8 +311,8 @@ pub(crate) fn tile_look(
         let plan = Plan::from_bytes(&plan)?;
         let bucket = from.bucket(&plan, bucket, &options)?;
         let mut renderer = choices.renderer(device)?;
-        let preset = choices.preset()?;
-        let (statistics, looked) = tiles::look(&plan, &bucket, renderer.as_mut(), preset, watch)?;
+        let (preset, refine) = (choices.preset()?, choices.effort()?);
+        let (statistics, looked) = tiles::look(&plan, &bucket, renderer.as_mut(), preset, refine, watch)?;
         let gpu = renderer.filter(Renderer::is_gpu).map(|renderer| renderer.name().to_owned());
         Ok((statistics.to_bytes(), looked.to_bytes(), gpu))
     })?;
@@ -405,7 +411,9 @@ pub(crate) fn tile_code(
     let (counts, coded) = without_gil(py, None, move |watch| {
         let (plan, coding) = (Plan::from_bytes(&plan)?, Coding::from_bytes(&coding)?);
         let (bucket, looked) = (from.bucket(&plan, bucket, &options)?, Looked::from_bytes(&looked)?);
-        let (counts, coded) = tiles::code(&plan, &coding, &bucket, &looked, choices.guess, watch)?;
+        let drawn = if choices.guess { None } else { Some(choices.preset()?) };
+        let refine = choices.effort()?;
+        let (counts, coded) = tiles::code(&plan, &coding, &bucket, &looked, drawn, refine, watch)?;
         Ok((counts.to_bytes(), coded.to_bytes()))
     })?;
     Ok((made(py, counts), made(py, coded)))
@@ -500,9 +508,9 @@ pub(crate) fn tile_whole(
         let joined = Joined::new(&named)?;
         let mut file = Vec::new();
         let renderer = choices.renderer(device)?;
-        let (options, preset) = (choices.options(), choices.preset()?);
-        let mut report =
-            tiles::in_parts(&options, preset.decibels(), renderer, &joined, (&mut file).into(), watch)?;
+        let (options, decibels) = (choices.options(), choices.preset()?.decibels());
+        let (refine, sink) = (choices.effort()?, (&mut file).into());
+        let mut report = tiles::in_parts(&options, decibels, refine, renderer, &joined, sink, watch)?;
         report.source_bytes = bytes;
         Ok((file, report))
     })?;
@@ -519,6 +527,13 @@ pub(crate) fn tile_choices(
 ) -> PyResult<()> {
     choices.reading(py, limit)?;
     device(py, &choices.device)?;
-    let check = || choices.preset().and_then(|_| Ok(choices.options().check()?));
+    let check = || {
+        let refine = [("refine", choices.effort()?.is_some())];
+        refuse(&[("guess", choices.guess)], &refine)?;
+        let keeps = [("keep_all", choices.keep_all), ("keep_order", choices.keep_order)];
+        refuse(&refine, &[keeps[0], keeps[1], ("tol", choices.tol.is_some())])?;
+        choices.preset()?;
+        Ok(choices.options().check()?)
+    };
     check().map_err(|error: Error| raise(py, &error))
 }

@@ -151,6 +151,17 @@ def test_a_small_scene_is_as_by_the_program(program: str, tmp_path: Path) -> Non
     assert (tmp_path / "by-ray.lexi").read_bytes() == made.read_bytes()
 
 
+def test_tiles_are_refined(few: list[Path], tmp_path: Path) -> None:
+    # Each tile is a bucket of its own.
+    of_each = [
+        lexisplat.ray.compress(few[:2], tmp_path / name, one_each=True, refine=refine)["files"]
+        for name, refine in [("refined", 0.005), ("plain", None)]
+    ]
+    for own, plain in zip(*of_each):
+        assert own["gaussians"] + own["removed"] == 500 and own["file_bytes"] < plain["file_bytes"]
+        assert len(lx.open(own["output"]).decode()) == own["gaussians"]
+
+
 @pytest.fixture
 def few(tmp_path: Path) -> list[Path]:
     """Three small tiles, for what goes wrong."""
@@ -227,6 +238,9 @@ def test_names_of_outputs_are_checked_before_any_work(few: list[Path], tmp_path:
         ({"tiles": few, "out": tmp_path / "city.lexi", "preset": "tiny"}, "preset"),
         ({"tiles": few, "out": tmp_path / "city.lexi", "tol": -1.0}, "tol = -1: a finite number above 0"),
         ({"tiles": few, "out": tmp_path / "city.lexi", "device": "auto"}, "cpu or gpu"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "refine": "slow"}, "quick, thorough"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "refine": 1, "keep_all": True}, "not together with refine"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "refine": 1, "guess": True}, "not together with guess"),
         ({"tiles": few, "out": tmp_path / "city.lexi", "limit": {"nonsense": 1}}, "nonsense"),
     ]:
         with pytest.raises(lx.ParameterError, match=text):

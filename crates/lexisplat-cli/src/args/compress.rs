@@ -86,8 +86,9 @@ pub(crate) struct Compress {
     pub(crate) max_gaussians: Option<usize>,
     /// Remove and merge more Gaussians, and fit the others to pictures of the scene: positions, shapes, colours and
     /// opacities. At the same quality the file is about a quarter smaller with cameras, and a tenth without.
-    /// `quick` and `thorough` are numbers of steps; MINUTES is about the time on one thread, such as 5. The scene is
-    /// held in memory as a whole [default when the option is given without a value: quick].
+    /// `quick` and `thorough` are numbers of steps; MINUTES is about the time on one thread, such as 5. A scene without
+    /// cameras of more than 262,144 Gaussians is refined in parts [default when the option is given without a value:
+    /// quick].
     #[arg(long, value_name = "quick|thorough|MINUTES", num_args = 0..=1, default_missing_value = "quick", conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) refine: Option<Refine>,
     /// Largest error of each Gaussian's SH vector, above 0, such as 0.05: the L2 norm of the difference, not squared.

@@ -143,7 +143,7 @@ def compress(
         Whether what shows is estimated without drawing: several times faster, for larger files.
     memory : int or str
         Bytes that packing a whole scene may take, about. A scene that needs more is packed in parts, and so is
-        one of more than 786,432 Gaussians without cameras.
+        one of more than 786,432 Gaussians without cameras, or of more than 262,144 with ``refine``.
     device : {"cpu", "gpu", "auto"} or a number as text
         What draws. With ``"cpu"`` the bytes are the same on every machine.
     drop_invalid : bool

@@ -6,11 +6,9 @@ use crate::formats::lexi::LexiWriter;
 use crate::packed::tiles::{
     Assembly, BUCKET, Coded, Coding, Looked, PackedFile, Plan, SHOWN, Sample, Steps, Tables,
 };
-use crate::packed::{PackOptions, Packer, Refit};
-use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity, guessed_total};
+use crate::packed::{Observation, PackOptions, Packer, Refit, ToRefit, expected_step};
+use crate::scene::sensitivity::{Sensitivity, guessed_total};
 use crate::scene::source::SplatSource;
-use crate::scene::splats::Splats;
-use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::progress::{Progress, Stage};
@@ -78,18 +76,21 @@ fn whole<E: From<Error>>(
         }
     };
     progress.end();
-    observed.check()?;
-    let Observed { sensitivity, step_factor: factor, memo } = observed;
-    let packer = Packer::new(splats.as_ref(), &sensitivity, options)?;
+    observed.check(options)?;
+    let Observed { instead, sensitivity, step_factor, memo } = observed;
+    let part = splats.as_ref();
+    let packer = Packer::new(instead.as_ref().unwrap_or(part), &sensitivity, options)?;
     drop(sensitivity);
-    let quantised = packer.quantise(factor * packer.step_for(decibels), true, progress)?;
+    let step = step_factor * expected_step(part.len(), decibels);
+    let mut quantised = packer.quantise(step, true, progress)?;
     let device = observer.as_ref().and_then(|observer| observer.device());
-    let mut refit = observer.map(|observer| {
-        |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| observer.refit(part, model, own, &memo)
-    });
-    let appearances = quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
+    let mut refit = observer.map(|observer| |of: ToRefit<'_, '_>| observer.refit(of));
+    let refit = refit.as_mut().map(|refit| refit as &mut Refit<'_, E>);
+    let observation = Observation { part, step, scale: 1.0, memo: &memo };
+    let appearances = quantised.refitted(refit, &observation, progress)?;
     let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
-    let packed = packed.with_device(device);
+    let removed = (part.len() - packed.len().min(part.len())) as u64;
+    let packed = packed.with_device(device).with_removed(removed);
     let writer = LexiWriter::packed(&packed);
     let tensor_bytes = writer.tensor_bytes().to_vec();
     writer.write(sink, progress)?;
@@ -149,11 +150,7 @@ fn in_buckets<E: From<Error>>(
         progress.check()?;
         let bucket = ordered.bucket(&plan, number, true)?;
         let looked = Looked::from_bytes(&all_looked.read(number)?)?;
-        let mut refit = observer.as_mut().map(|observer| {
-            |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| {
-                observer.refit(part, model, own, looked.memo())
-            }
-        });
+        let mut refit = observer.as_mut().map(|observer| |of: ToRefit<'_, '_>| observer.refit(of));
         let refit = refit.as_mut().map(|refit| refit as &mut Refit<'_, E>);
         let (own, coded) = coding.code(&plan, &bucket, &looked, refit, progress)?;
         counts.push(own);

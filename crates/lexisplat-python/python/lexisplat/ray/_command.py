@@ -48,6 +48,7 @@ def parser() -> argparse.ArgumentParser:
     add("--keep-order", action="store_true", help="store the order of the source")
     add("--keep-all", action="store_true", help="leave no Gaussian out")
     add("--lod", action="store_true", help="add levels of detail: layers of fewer Gaussians, for parts that are far")
+    add("--refine", type=_effort, metavar="EFFORT", help="fit everything to pictures of the parts: quick, thorough or minutes")
     add("--guess", action="store_true", help="estimate what shows instead of drawing: several times faster, larger files")
     add("--device", default="cpu", help="what draws on the workers: cpu, gpu, auto or a number [cpu]")
     add("--one-each", action="store_true", help="write a file for each tile, with one dictionary")
@@ -61,6 +62,10 @@ def parser() -> argparse.ArgumentParser:
     add("--json", action="store_true", help="print the report as JSON")
     add("-q", "--quiet", action="store_true", help="print no progress")
     return made
+
+
+def _effort(text: str) -> str | float:
+    return text if text in ("quick", "thorough") else float(text)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -86,7 +91,7 @@ def _run(given: argparse.Namespace) -> dict[str, Any]:
     here = {} if given.address else {"num_cpus": given.workers, "include_dashboard": False}
     ray.init(address=given.address or "local", log_to_driver=False, logging_level="error", **here)
     passed = (
-        "preset tol atoms seed keep_order keep_all lod guess device one_each skip_bad drop_invalid drop_extras overwrite threads"
+        "preset tol atoms seed keep_order keep_all lod refine guess device one_each skip_bad drop_invalid drop_extras overwrite threads"
     )
     options = {name: getattr(given, name) for name in passed.split()}
     with warnings.catch_warnings():

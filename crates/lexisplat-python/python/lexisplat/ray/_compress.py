@@ -7,7 +7,7 @@ import os
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from .. import _native
 from .._arguments import checked, count, flag
@@ -45,6 +45,7 @@ def compress(
     keep_order: bool = False,
     keep_all: bool = False,
     lod: bool = False,
+    refine: Literal["quick", "thorough"] | float | None = None,
     guess: bool = False,
     device: str = "cpu",
     one_each: bool = False,
@@ -69,8 +70,9 @@ def compress(
         ``opacities``, ``sh0`` and ``shN`` as the attributes of :class:`lexisplat.Splats`.
     out : path
         The file to write, by the process that calls; with ``one_each`` a folder, where each tile's file has its name.
-    preset, tol, atoms, seed, keep_order, keep_all, lod, guess, device
-        As :func:`lexisplat.compress`. ``device`` is that of the workers.
+    preset, tol, atoms, seed, keep_order, keep_all, lod, refine, guess, device
+        As :func:`lexisplat.compress`. ``device`` is that of the workers. All parts together take the minutes of ``refine``, on one
+        thread.
     one_each : bool
         Whether each tile becomes a file of its own. All have the dictionary, the steps and the tables of the whole scene.
     skip_bad : bool
@@ -103,7 +105,7 @@ def compress(
     for name, value in {**flags, **reading}.items():
         flag(name, value)
     asked = {"preset": preset, "tol": tol, "atoms": atoms, "seed": seed}
-    asked.update(keep_order=keep_order, keep_all=keep_all, lod=lod, guess=guess)
+    asked.update(keep_order=keep_order, keep_all=keep_all, lod=lod, refine=refine, guess=guess)
     choices = {**options_of(asked), **reading, "device": device_of(device)}
     limits, threads = limits_of(limit), count("threads", threads)
     listed = tiles_of(tiles)

@@ -28,12 +28,49 @@ use crate::support::progress::{Progress, Stage};
 use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
 
-/// A function that fits the base colours and opacities of a part of a scene to pictures of the part.
-///
-/// Its arguments are the part, the model that the file has of it, and the sensitivity to the appearance of each Gaussian
-/// of the model. It returns one appearance for each Gaussian of the model, or `None` to leave them as they are.
-pub type Refit<'a, E = Error> =
-    dyn FnMut(&Splats, &Model, &[AppearanceSensitivity]) -> Result<Option<Vec<Appearance>>, E> + 'a;
+/// A function that fits a part of a scene, as the file has it, to pictures of the part. It may replace SH-rest
+/// ([`Quantised::set_sh_rest`]). It returns one appearance for each Gaussian of the file, or `None` to leave them as they are.
+pub type Refit<'a, E = Error> = dyn FnMut(ToRefit<'_, '_>) -> Result<Option<Vec<Appearance>>, E> + 'a;
+
+/// A part of a scene to fit to pictures of the part.
+#[derive(Debug)]
+pub struct ToRefit<'r, 'q> {
+    /// The part as the source has it.
+    pub part: &'r Splats,
+    /// The part as the file has it.
+    pub model: Model,
+    /// The file, of which SH-rest may still change.
+    pub quantised: &'r mut Quantised<'q>,
+    /// The sensitivity to the appearance of each Gaussian of the file, as it was observed.
+    pub sensitivities: Vec<AppearanceSensitivity>,
+    /// The overall step that goes with [`Self::sensitivities`].
+    pub step: f64,
+    /// The memo of [`Observed`](crate::stream::Observed).
+    pub memo: &'r [u8],
+}
+
+/// What a part was packed from, and how.
+pub(crate) struct Observation<'r> {
+    /// The part as the source has it.
+    pub(crate) part: &'r Splats,
+    /// The overall step.
+    pub(crate) step: f64,
+    /// Factor from observed sensitivities to those of the Gaussians.
+    pub(crate) scale: f32,
+    /// The memo of [`Observed`](crate::stream::Observed).
+    pub(crate) memo: &'r [u8],
+}
+
+impl Observation<'_> {
+    /// Returns the sensitivities as they were observed.
+    pub(crate) fn observed(&self, own: &[AppearanceSensitivity]) -> Vec<AppearanceSensitivity> {
+        let observed = |s: &AppearanceSensitivity| AppearanceSensitivity {
+            colour: s.colour / self.scale,
+            opacity: s.opacity / self.scale,
+        };
+        own.iter().map(observed).collect()
+    }
+}
 
 /// The Gaussians of a file. All lists have the same order.
 #[derive(Debug, Clone, Default)]
@@ -80,7 +117,7 @@ struct ChunkRows {
 /// A scene that is quantised with one overall step. The Gaussians that stay, the steps, the dictionary and the codes are
 /// settled. [`Self::finish`] makes the file with the scene's own base colours and opacities, or with others. These change
 /// nothing else.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Quantised<'a> {
     splats: Cow<'a, Splats>,
     options: &'a PackOptions,
@@ -139,12 +176,13 @@ impl<'a> Quantised<'a> {
             |layer: usize, i: usize| encoding.layering.probability(layer, gaussians.sensitivities[i].opacity);
         let interim = InterimChanges::new(&splats.geometry, &gaussians.keys, &counts, probability);
         let splats = Cow::Borrowed(splats);
-        let part = Self { splats, options, gaussians, chunks, codes: Vec::new(), interim, encoding };
-        part.coded(progress)
+        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), interim, encoding };
+        part.code(progress)?;
+        Ok(part)
     }
 
     /// Chooses the codes of all chunks.
-    fn coded(mut self, progress: &dyn Progress) -> Result<Self> {
+    fn code(&mut self, progress: &dyn Progress) -> Result<()> {
         let ordered = self.ordered(None)?;
         let codes = self.chunks.iter().map(|ChunkRows { rows, .. }| {
             progress.check()?;
@@ -153,38 +191,29 @@ impl<'a> Quantised<'a> {
             Ok(codes)
         });
         self.codes = codes.collect::<Result<_>>()?;
-        Ok(self)
+        Ok(())
     }
 
-    /// Returns the same Gaussians with codes of other SH-rest. `sh_rest` has a row for each Gaussian in the order of the
-    /// file. The dictionary and all steps stay, and so do the positions, scales and rotations of the file.
+    /// Replaces the SH-rest and chooses new codes. `sh_rest` has a row for each Gaussian in the order of the file. The
+    /// dictionary and all steps stay, and so do the positions, scales and rotations of the file.
     ///
     /// # Errors
     /// [`Error::Parameter`] for rows that are too few, too many or not finite; [`Error::Cancelled`].
-    pub fn with_sh_rest(&self, sh_rest: &[f32], progress: &dyn Progress) -> Result<Self> {
+    pub fn set_sh_rest(&mut self, sh_rest: &[f32], progress: &dyn Progress) -> Result<()> {
         let rest = self.splats.degree.rest();
         let expected = self.len() * rest;
         if sh_rest.len() != expected {
             return Err(Error::parameter("sh_rest", sh_rest.len(), format!("{expected} values")));
         }
         all_finite([("sh_rest", sh_rest)])?;
-        let mut splats = Splats::clone(&self.splats);
+        let splats = self.splats.to_mut();
         for (g, row) in self.gaussians.keys.iter().zip(sh_rest.chunks_exact(rest.max(1))) {
             splats.sh_rest[g.index() * rest..(g.index() + 1) * rest].copy_from_slice(row);
         }
         progress.begin(Stage::Code, self.len() as u64);
-        let again = Self {
-            splats: Cow::Owned(splats),
-            options: self.options,
-            gaussians: self.gaussians.clone(),
-            chunks: self.chunks.clone(),
-            codes: Vec::new(),
-            interim: self.interim.clone(),
-            encoding: self.encoding.clone(),
-        };
-        let again = again.coded(progress)?;
+        self.code(progress)?;
         progress.end();
-        Ok(again)
+        Ok(())
     }
 
     /// Returns the number of Gaussians of the file.
@@ -345,15 +374,19 @@ impl<'a> Quantised<'a> {
     /// Returns the appearances that `refit` fits to pictures. `None` if base colours and opacities may not change, or if
     /// there are no Gaussians.
     pub(crate) fn refitted<E: From<Error>>(
-        &self,
+        &mut self,
         refit: Option<&mut Refit<'_, E>>,
+        observation: &Observation<'_>,
         progress: &dyn Progress,
     ) -> Result<Option<Vec<Appearance>>, E> {
         let Some(refit) = refit.filter(|_| self.options.may_change() && !self.is_empty()) else {
             return Ok(None);
         };
         let model = self.finish(None, None, progress)?.0.unpack()?;
-        refit(&self.splats, &model, self.sensitivities())
+        let sensitivities = observation.observed(self.sensitivities());
+        let Observation { part, step, scale, memo } = *observation;
+        let step = step / f64::from(scale).sqrt();
+        refit(ToRefit { part, model, quantised: self, sensitivities, step, memo })
     }
 }
 
@@ -404,17 +437,20 @@ mod tests {
         // The scene's own rows in the order of the file give the same file.
         let rows: Vec<f32> =
             quantised.sources().iter().flat_map(|g| splats.rest(g.index())).copied().collect();
-        let same = quantised.with_sh_rest(&rows, &Silent).unwrap();
-        assert_eq!(model(&same), own);
+        let with = |rows: &[f32]| {
+            let mut other = quantised.clone();
+            other.set_sh_rest(rows, &Silent).map(|()| other)
+        };
+        assert_eq!(model(&with(&rows).unwrap()), own);
         let halved: Vec<f32> = rows.iter().map(|v| 0.5 * v).collect();
-        let other = model(&quantised.with_sh_rest(&halved, &Silent).unwrap());
+        let other = model(&with(&halved).unwrap());
         assert_eq!(other.geometry, own.geometry);
         let error = |rows: &[f32]| {
             other.sh_rest.iter().zip(rows).map(|(a, b)| f64::from((a - b) * (a - b))).sum::<f64>()
         };
         assert!(error(&halved) < 0.1 * error(&rows), "{} {}", error(&halved), error(&rows));
-        assert!(quantised.with_sh_rest(&rows[1..], &Silent).is_err());
-        assert!(quantised.with_sh_rest(&vec![f32::NAN; rows.len()], &Silent).is_err());
+        assert!(with(&rows[1..]).is_err());
+        assert!(with(&vec![f32::NAN; rows.len()]).is_err());
     }
 
     #[test]

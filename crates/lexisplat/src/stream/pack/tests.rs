@@ -17,37 +17,32 @@ fn options() -> PackOptions {
 }
 
 /// An observer that draws nothing. Its methods return the results of the given functions.
-struct Told<J, R = fn(&Splats, &Model, &[AppearanceSensitivity]) -> Result<Option<Vec<Appearance>>>> {
+struct Told<J, R = fn(ToRefit<'_, '_>) -> Result<Option<Vec<Appearance>>>> {
     judge: J,
     refit: Option<R>,
 }
 
-impl<J: FnMut(&Splats) -> Result<Sensitivity>> Told<J> {
+impl<J> Told<J> {
     fn by(judge: J) -> Self {
         Self { judge, refit: None }
     }
 }
 
-impl<J, R> Observer for Told<J, R>
+impl<J, O, R> Observer for Told<J, R>
 where
-    J: FnMut(&Splats) -> Result<Sensitivity>,
-    R: FnMut(&Splats, &Model, &[AppearanceSensitivity]) -> Result<Option<Vec<Appearance>>>,
+    J: FnMut(&Splats) -> Result<O>,
+    O: Into<Observed>,
+    R: FnMut(ToRefit<'_, '_>) -> Result<Option<Vec<Appearance>>>,
 {
     fn observe(&mut self, part: &Splats) -> Result<Observed> {
         let memo = u64::try_from(part.len()).unwrap().to_le_bytes().to_vec();
         Ok(Observed { memo, ..(self.judge)(part)?.into() })
     }
 
-    fn refit(
-        &mut self,
-        part: &Splats,
-        model: &Model,
-        weights: &[AppearanceSensitivity],
-        memo: &[u8],
-    ) -> Result<Option<Vec<Appearance>>> {
-        assert_eq!(memo, u64::try_from(part.len()).unwrap().to_le_bytes());
+    fn refit(&mut self, of: ToRefit<'_, '_>) -> Result<Option<Vec<Appearance>>> {
+        assert_eq!(of.memo, u64::try_from(of.part.len()).unwrap().to_le_bytes());
         match &mut self.refit {
-            Some(refit) => refit(part, model, weights),
+            Some(refit) => refit(of),
             None => Ok(None),
         }
     }
@@ -157,11 +152,11 @@ fn appearances_are_fitted_part_by_part() {
         (0..model.len()).map(moved).collect()
     };
     let fitted = |options: &PackOptions, bucket: usize| {
-        let refit = |part: &Splats, model: &Model, weights: &[AppearanceSensitivity]| {
+        let refit = |of: ToRefit<'_, '_>| {
             // The part also has the Gaussians that the file leaves out, and the others are in order.
-            assert!(part.len() > model.len() || options.keep_order);
-            assert_eq!(model.len(), weights.len());
-            Ok(Some(others(model)))
+            assert!(of.part.len() > of.model.len() || options.keep_order);
+            assert_eq!(of.model.len(), of.sensitivities.len());
+            Ok(Some(others(&of.model)))
         };
         let mut told = Told { judge: |part: &Splats| Ok(shown(part, total)), refit: Some(refit) };
         streamed_with(&splats, Some(&mut told), options, bucket).unwrap().0
@@ -187,6 +182,48 @@ fn appearances_are_fitted_part_by_part() {
     let moved = moved.map(|(dc, &number)| f64::from(dc[0] - splats.geometry.dc[number as usize][0]));
     let mean = moved.sum::<f64>() / model.len() as f64;
     assert!((0.45..0.55).contains(&mean), "{mean}");
+}
+
+/// The first half of the Gaussians of a part in another order and at other places, and the guess of all.
+fn moved_half(part: &Splats) -> Observed {
+    let order: Vec<u32> = (0..u32::try_from(part.len()).unwrap() / 2).rev().collect();
+    let mut half = part.gathered(&order);
+    half.geometry.positions.iter_mut().for_each(|position| position[1] -= 3.0);
+    let sensitivity = Sensitivity::guess(&half.geometry);
+    Observed { instead: Some(half), ..sensitivity.into() }
+}
+
+#[test]
+fn other_gaussians_are_packed_instead_of_a_part() {
+    let options = PackOptions { keep_order: false, ..options() };
+    let splats = scene(12_000);
+    for bucket in [3000, BUCKET] {
+        let mut parts = 0;
+        let refit = |of: ToRefit<'_, '_>| {
+            parts += 1;
+            assert!(of.part.len() >= 2 * of.model.len(), "{} {}", of.part.len(), of.model.len());
+            let rows = vec![0.0; of.model.dense_rest().len()];
+            of.quantised.set_sh_rest(&rows, &Silent)?;
+            Ok(None)
+        };
+        let mut told = Told { judge: |part: &Splats| Ok(moved_half(part)), refit: Some(refit) };
+        let (found, done) = streamed_with(&splats, Some(&mut told), &options, bucket).unwrap();
+        assert_eq!(parts, 12_000_usize.div_ceil(bucket));
+        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+        // A part of an odd number has one less.
+        assert!((6000 - parts..=6000).contains(&model.len()), "{}", model.len());
+        assert_eq!(done.head.removed, (12_000 - model.len()) as u64);
+        let ExtraValues::U32(numbers) = &model.geometry().extras[0].values else { panic!("not u32") };
+        for (position, &number) in model.geometry().positions.iter().zip(numbers) {
+            let [x, y, z] = splats.geometry.positions[number as usize];
+            assert!((0..3).all(|k| (position[k] - [x, y - 3.0, z][k]).abs() < 0.1), "{number}");
+        }
+        let largest = model.into_splats().sh_rest.into_iter().fold(0.0_f32, |most, v| most.max(v.abs()));
+        assert!(largest < 0.1, "{largest}");
+    }
+    let mut told = Told::by(|part: &Splats| Ok(moved_half(part)));
+    let error = streamed(&splats, Some(&mut told), 3000).unwrap_err().to_string();
+    assert!(error.contains("keep_order"), "{error}");
 }
 
 #[test]

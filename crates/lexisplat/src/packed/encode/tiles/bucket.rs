@@ -2,13 +2,15 @@
 
 use std::ops::Range;
 
-use super::plan::{Piece, Plan};
+use super::plan::{Piece, Plan, placed};
 use crate::packed::curve::MortonKey;
 use crate::packed::decode::reorder::{gather, gather_geometry};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::stream::RowLayout;
 use crate::support::error::{Error, Result};
+use crate::support::maths::Vec3;
+use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
 
 /// The Gaussians of a bucket, sorted along the Morton curve.
@@ -108,6 +110,30 @@ impl Bucket {
     /// Returns the cell of each Gaussian, and its number in the bucket.
     pub(super) fn keys(&self) -> Vec<MortonKey> {
         (0..).zip(&self.keys).map(|(source, key)| MortonKey { source, ..*key }).collect()
+    }
+
+    /// Returns a bucket of the same number with `splats` in the order of the file, and the index that each of them had before.
+    /// `splats` are near the Gaussians of the bucket. One of them whose cell is before or after all cells of the bucket gets the
+    /// cell of the nearest Gaussian of the bucket, because the cells of a file rise from bucket to bucket.
+    pub(super) fn with(&self, plan: &Plan, splats: &Splats) -> (Self, Vec<u32>) {
+        let cells = self.keys.first().map_or(0, |key| key.cell)..=self.keys.last().map_or(0, |key| key.cell);
+        let key = |(i, &position)| {
+            let key = placed(&plan.grid, position, i);
+            let cell = if cells.contains(&key.cell) { key.cell } else { self.nearest_cell(position) };
+            MortonKey { cell, ..key }
+        };
+        let mut keys: Vec<MortonKey> = map_vec((0..).zip(&splats.geometry.positions).collect(), key);
+        keys.sort_unstable();
+        let order: Vec<u32> = keys.iter().map(|key| key.source).collect();
+        (0..).zip(&mut keys).for_each(|(i, key)| key.source = i);
+        (Self { number: self.number, splats: splats.gathered(&order), keys }, order)
+    }
+
+    /// Returns the cell of the Gaussian nearest to `position`.
+    fn nearest_cell(&self, position: Vec3) -> u64 {
+        let squared = |own: &Vec3| (0..3).map(|k| (own[k] - position[k]).powi(2)).sum::<f32>();
+        let distances = self.splats.geometry.positions.iter().map(squared).zip(&self.keys);
+        distances.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, key)| key.cell)
     }
 
     /// Returns the number of the bucket among all buckets.

@@ -19,9 +19,7 @@ use crate::packed::encode::quantised::{Gaussians, Quantised, Refit};
 use crate::packed::entropy::tables;
 use crate::packed::entropy::tables::Lookup;
 use crate::scene::extra::Extra;
-use crate::scene::sensitivity::AppearanceSensitivity;
-use crate::scene::splats::{Splats, filter};
-use crate::sparse::model::Model;
+use crate::scene::splats::filter;
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
@@ -131,8 +129,8 @@ impl Coding {
         Ok(Encoding::new((coder, self.atoms.clone()), layering, self.most_dc, clock))
     }
 
-    /// Codes the Gaussians of `bucket` that stay, with the bucket's own tables. `refit` fits their base colours and
-    /// opacities, if these may change. Advances `progress` by the number of Gaussians.
+    /// Codes the Gaussians of `bucket` that stay, with the bucket's own tables. `refit` fits them to pictures, if their base
+    /// colours and opacities may change. Advances `progress` by the number of Gaussians.
     ///
     /// # Errors
     /// [`Error::Parameter`] if `looked` is of another bucket, or if a file cannot hold a value; errors of `refit`;
@@ -145,6 +143,8 @@ impl Coding {
         refit: Option<&mut Refit<'_, E>>,
         progress: &dyn Progress,
     ) -> Result<(Counts, Coded), E> {
+        let observation = looked.observation(plan, bucket);
+        let bucket = &*looked.packed(plan, bucket)?;
         let splats = &bucket.splats;
         let (mut sensitivities, stays) =
             looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
@@ -155,14 +155,9 @@ impl Coding {
         let classes = self.floor.classes(&free, &splats.geometry, &keys);
         let gaussians = Gaussians { keys, classes, sensitivities };
         let options = &plan.options;
-        let quantised = Quantised::of_part(splats, options, gaussians, self.encoding(plan)?, progress)?;
-        let mut refit = refit.map(|refit| {
-            |part: &Splats, model: &Model, own: &[AppearanceSensitivity]| {
-                refit(part, model, &looked.observed(own))
-            }
-        });
-        let appearances =
-            quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
+        let encoding = self.encoding(plan)?;
+        let mut quantised = Quantised::of_part(splats, options, gaussians, encoding, progress)?;
+        let appearances = quantised.refitted(refit, &observation, progress)?;
         let (counts, chunks) = quantised.counted(appearances.as_deref(), progress)?;
         let tables = tables::Tables::of(&counts)?;
         let chunks = map_vec(chunks, |(layer, chunk)| Written::new(layer, &chunk, &tables));

@@ -1,5 +1,7 @@
 //! The results of measuring a bucket: sensitivities of its Gaussians, and sums over them.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::bucket::Bucket;
@@ -9,9 +11,10 @@ use crate::packed::bitstream::PointsOfView;
 use crate::packed::encode::fit::{ColourMoments, Derivatives};
 use crate::packed::encode::octaves::{Histogram, RoundedSensitivities};
 use crate::packed::encode::pack::check;
+use crate::packed::encode::quantised::Observation;
 use crate::packed::encode::removal::{changes_without, is_worth_its_bits};
 use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity};
-use crate::stream::Observed;
+use crate::stream::{Observed, RowLayout};
 use crate::support::error::{Error, Result};
 
 /// Sum of the squared sensitivities that views measure. A guess scales its sensitivities to a sum of 1, but the sum of
@@ -20,8 +23,8 @@ use crate::support::error::{Error, Result};
 pub(crate) const SHOWN: f64 = 0.1;
 
 /// The memory of a measured bucket. It holds the sensitivities of each Gaussian, rounded to eighths of an octave, and
-/// whether the Gaussian stays. It also holds the factor from the observer's sensitivities to these, and the observer's
-/// memo.
+/// whether the Gaussian stays. It also holds the factor from the observer's sensitivities to these, the observer's memo, and
+/// the Gaussians that are packed instead of the bucket's.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Looked {
     plan_id: u32,
@@ -31,6 +34,8 @@ pub struct Looked {
     stays: Vec<u8>,
     scale: f32,
     memo: Vec<u8>,
+    /// The rows of the Gaussians that are packed instead of the bucket's, in the order of the file.
+    instead: Option<Vec<u8>>,
 }
 
 /// Sums over the Gaussians of a bucket.
@@ -58,16 +63,16 @@ impl Bucket {
     /// Gaussian alone.
     ///
     /// # Errors
-    /// [`crate::Error::Parameter`] if the sensitivity has another length or values that are not finite, or if the step
-    /// factor is not a finite number above 0.
+    /// [`crate::Error::Parameter`] if the sensitivity has another length or values that are not finite, if the step
+    /// factor is not a finite number above 0, or if other Gaussians are packed although the options keep all.
     pub fn look(&self, plan: &Plan, observed: Option<Observed>) -> Result<(LookStatistics, Looked)> {
-        let (Observed { sensitivity, memo, .. }, scale) = match observed {
+        let (Observed { instead, mut sensitivity, memo, .. }, scale) = match observed {
             None => {
                 let total = plan.guessed_total / SHOWN;
                 (Sensitivity::guess_of_part(&self.splats.geometry, total).into(), 1.0)
             }
             Some(mut observed) => {
-                observed.check()?;
+                observed.check(&plan.options)?;
                 let share = self.splats.len() as f64 / plan.len().max(1) as f64;
                 // All parts have one overall step. A part that asks for half of that step gets four times the
                 // sensitivities instead.
@@ -77,9 +82,20 @@ impl Bucket {
                 (observed, scale)
             }
         };
-        check(&self.splats, &sensitivity)?;
-        let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
-        Ok((statistics, Looked { scale, memo, ..looked }))
+        let Some(splats) = instead else {
+            check(&self.splats, &sensitivity)?;
+            let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
+            return Ok((statistics, Looked { scale, memo, ..looked }));
+        };
+        check(&splats, &sensitivity)?;
+        let (mut bucket, order) = self.with(plan, &splats);
+        let mut places = vec![0; order.len()];
+        (0..).zip(&order).for_each(|(place, &before)| places[before as usize] = place);
+        sensitivity = sensitivity.scattered(&places);
+        let (statistics, looked) = LookStatistics::of(&bucket, &sensitivity, plan);
+        let mut rows = Vec::new();
+        RowLayout::new(plan.empty()).pack(&mut bucket.splats, &mut rows);
+        Ok((statistics, Looked { scale, memo, instead: Some(rows), ..looked }))
     }
 }
 
@@ -137,22 +153,27 @@ impl Looked {
             stays: bits,
             scale: 1.0,
             memo: Vec::new(),
+            instead: None,
         }
     }
 
-    /// Returns the observer's own sensitivities, given the `scaled` ones.
-    pub(super) fn observed(&self, scaled: &[AppearanceSensitivity]) -> Vec<AppearanceSensitivity> {
-        let own = |s: &AppearanceSensitivity| AppearanceSensitivity {
-            colour: s.colour / self.scale,
-            opacity: s.opacity / self.scale,
-        };
-        scaled.iter().map(own).collect()
+    /// Returns what the Gaussians of `bucket` were packed from.
+    pub(super) fn observation<'r>(&'r self, plan: &Plan, bucket: &'r Bucket) -> Observation<'r> {
+        Observation { part: &bucket.splats, step: plan.step, scale: self.scale, memo: &self.memo }
     }
 
-    /// Returns the memo of [`Observed`](crate::stream::Observed).
-    #[must_use]
-    pub fn memo(&self) -> &[u8] {
-        &self.memo
+    /// Returns the Gaussians that are packed: those of `bucket`, or those instead.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if the rows of the latter are damaged.
+    pub(super) fn packed<'b>(&self, plan: &Plan, bucket: &'b Bucket) -> Result<Cow<'b, Bucket>> {
+        let Some(rows) = &self.instead else { return Ok(Cow::Borrowed(bucket)) };
+        let layout = RowLayout::new(plan.empty());
+        if !rows.len().is_multiple_of(layout.bytes()) {
+            let expected = format!("rows of {} bytes", layout.bytes());
+            return Err(Error::parameter("looked", format!("{} bytes", rows.len()), expected));
+        }
+        Ok(Cow::Owned(bucket.with(plan, &layout.unpack(rows)).0))
     }
 
     /// Returns the sensitivities of each Gaussian, and whether it stays. With `first_stays`, the first Gaussian stays in any

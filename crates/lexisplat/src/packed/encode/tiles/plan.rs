@@ -414,7 +414,7 @@ fn shared_offset(tiles: &[(String, Vec<Survey>)]) -> Option<Offset> {
     Offset::shared(&offsets)
 }
 
-fn placed(grid: &Grid, position: Vec3, row: u64) -> MortonKey {
+pub(super) fn placed(grid: &Grid, position: Vec3, row: u64) -> MortonKey {
     // Scenes have at most 2^32 - 2 Gaussians.
     MortonKey { cell: grid.cell(position), source: u32::try_from(row).unwrap_or(u32::MAX) }
 }

@@ -70,6 +70,7 @@ impl Sample {
     /// # Errors
     /// [`Error::Parameter`] if `looked` is of another bucket.
     pub fn add(&mut self, plan: &Plan, bucket: &Bucket, looked: &Looked) -> Result<()> {
+        let bucket = &*looked.packed(plan, bucket)?;
         let n = bucket.splats.len();
         let (sensitivities, stays) = looked.of_each(plan, bucket, false)?;
         // One of `every` runs is taken. In the next bucket it is the next run.

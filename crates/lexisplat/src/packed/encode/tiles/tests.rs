@@ -234,7 +234,8 @@ fn a_bucket_that_asks_for_half_the_step_has_four_times_the_sensitivity() {
         );
     }
     // The observer gets its own sensitivities back.
-    let again = [half.observed(&sensitivities(&half)), usual.observed(&sensitivities(&usual))];
+    let observed = |looked: &Looked| looked.observation(&plan, &bucket).observed(&sensitivities(looked));
+    let again = [observed(&half), observed(&usual)];
     for (a, b) in again[0].iter().zip(&again[1]) {
         assert!((a.opacity / b.opacity).log2().abs() < 0.07, "{a:?} {b:?}");
     }
