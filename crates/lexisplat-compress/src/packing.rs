@@ -93,6 +93,22 @@ pub enum Quality {
     Target(Target),
 }
 
+impl Quality {
+    /// Returns the PSNR asked for, in dB. It is a quality that a scene in parts can have.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for targets other than a mean PSNR, and for a PSNR that is not a finite number above 0.
+    pub fn decibels(self) -> Result<f64> {
+        match self {
+            Self::Preset(preset) => Ok(preset.decibels()),
+            Self::Target(target @ Target::MeanPsnr(decibels)) => target.check().map(|()| decibels),
+            Self::Target(target) => {
+                Err(Error::parameter(target.name(), "a scene in parts", "the whole scene"))
+            }
+        }
+    }
+}
+
 impl From<Preset> for Quality {
     fn from(preset: Preset) -> Self {
         Self::Preset(preset)
@@ -257,20 +273,6 @@ impl Packing {
             Some(choice) if !fits => Err(Error::Memory { choice, needed, allowed: self.memory }),
             Some(_) => Ok(true),
             None => Ok(fits && (cameras || gaussians <= most)),
-        }
-    }
-
-    /// Returns the PSNR asked for, in dB.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] for targets other than a mean PSNR.
-    pub(crate) fn decibels(&self) -> Result<f64> {
-        match self.quality {
-            Quality::Preset(preset) => Ok(preset.decibels()),
-            Quality::Target(Target::MeanPsnr(decibels)) => Ok(decibels),
-            Quality::Target(target) => {
-                Err(Error::parameter(target.name(), "a scene in parts", "the whole scene"))
-            }
         }
     }
 

@@ -123,7 +123,7 @@ impl Packing {
     ) -> Result<CompressionReport> {
         let source = WithView::best(source, progress)?;
         let renderer = Some(self.renderer()?);
-        in_parts(&self.options, self.decibels()?, self.refine, renderer, &source, sink, progress)
+        in_parts(&self.options, self.quality.decibels()?, self.refine, renderer, &source, sink, progress)
     }
 
     /// Returns the given cameras, or else likely cameras that seem to belong to `splats`.

@@ -2,7 +2,7 @@
 
 use lexisplat::Progress;
 use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
-use lexisplat::packed::{Preset, ToRefit};
+use lexisplat::packed::ToRefit;
 use lexisplat_render::Renderer;
 
 use crate::effort::Refine;
@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::parts::Parts;
 pub use crate::parts::in_parts;
 
-/// Measures the sensitivity of a bucket with `renderer`, for the quality that `preset` aims at, and refines its Gaussians if there
+/// Measures the sensitivity of a bucket with `renderer`, for a PSNR of about `decibels`, and refines its Gaussians if there
 /// is `refine`. Without a renderer the sensitivity is guessed from each Gaussian alone.
 ///
 /// # Errors
@@ -20,17 +20,17 @@ pub fn look(
     plan: &Plan,
     bucket: &Bucket,
     renderer: Option<&mut Renderer>,
-    preset: Preset,
+    decibels: f64,
     refine: Option<Refine>,
     progress: &dyn Progress,
 ) -> Result<(LookStatistics, Looked)> {
-    let parts = parts(plan, preset, refine);
+    let parts = parts(plan, decibels, refine);
     let observe = |renderer| parts.observe(renderer, bucket.splats(), progress);
     let observed = renderer.map(observe).transpose()?;
     Ok(bucket.look(plan, observed.map(|(observed, _)| observed))?)
 }
 
-/// Codes a bucket. With `drawn`, its sensitivity was measured by pictures for `preset`, and the file is fitted to pictures: base
+/// Codes a bucket. With `drawn`, the decibels for which its sensitivity was measured in pictures, the file is fitted to pictures: base
 /// colours and opacities, and with `refine` SH-rest.
 ///
 /// # Errors
@@ -40,19 +40,19 @@ pub fn code(
     coding: &Coding,
     bucket: &Bucket,
     looked: &Looked,
-    drawn: Option<Preset>,
+    drawn: Option<f64>,
     refine: Option<Refine>,
     progress: &dyn Progress,
 ) -> Result<(Counts, Coded)> {
-    let Some(preset) = drawn else {
+    let Some(decibels) = drawn else {
         return coding.code(plan, bucket, looked, None, progress);
     };
-    let parts = parts(plan, preset, refine);
+    let parts = parts(plan, decibels, refine);
     let mut refit = |of: ToRefit<'_, '_>| parts.refit(of, progress).map(Some);
     coding.code(plan, bucket, looked, Some(&mut refit), progress)
 }
 
-fn parts(plan: &Plan, preset: Preset, refine: Option<Refine>) -> Parts<'_> {
+fn parts(plan: &Plan, decibels: f64, refine: Option<Refine>) -> Parts<'_> {
     let (options, gaussians) = (plan.options(), plan.len());
-    Parts { options, decibels: preset.decibels(), refine, gaussians }
+    Parts { options, decibels, refine, gaussians }
 }

@@ -7,10 +7,10 @@ use lexisplat::packed::tiles::{
     Assembly, Bucket, BucketReader, Coded, Coding, Counts, LookStatistics, Looked, Plan, Sample,
     SampleStatistics, Steps, Survey, Tables,
 };
-use lexisplat::packed::{PackOptions, Preset};
+use lexisplat::packed::PackOptions;
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Joined, Silent, SplatSource, Splats};
-use lexisplat_compress::{CompressionReport, Error, Refine, tiles};
+use lexisplat_compress::{CompressionReport, Error, Quality, Refine, Target, tiles};
 use lexisplat_render::{Device, Renderer};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -74,6 +74,7 @@ impl Tile {
 #[pyo3(from_item_all)]
 pub(crate) struct Choices {
     preset: Option<String>,
+    psnr: Option<f64>,
     tol: Option<f64>,
     atoms: Option<usize>,
     seed: u64,
@@ -101,8 +102,12 @@ impl Choices {
         effort(self.refine.as_deref())
     }
 
-    fn preset(&self) -> Result<Preset> {
-        preset(self.preset.as_deref())
+    /// Returns the PSNR asked for, in dB.
+    fn decibels(&self) -> Result<f64> {
+        match self.psnr {
+            Some(decibels) => Quality::from(Target::MeanPsnr(decibels)).decibels(),
+            None => Ok(preset(self.preset.as_deref())?.decibels()),
+        }
     }
 
     /// Returns the renderer; `None` if the sensitivity is guessed.
@@ -241,7 +246,7 @@ pub(crate) fn tile_plan(
         let read =
             |(name, blocks): (String, Vec<PyBackedBytes>)| Ok((name, all(&blocks, Survey::from_bytes)?));
         let surveys = surveys.into_iter().map(read).collect::<Result<Vec<_>>>()?;
-        let plan = Plan::new(&surveys, &choices.options(), choices.preset()?.decibels(), one_each)?;
+        let plan = Plan::new(&surveys, &choices.options(), choices.decibels()?, one_each)?;
         let groups = (0..plan.groups()).map(|group| plan.group(group)).collect();
         let files = plan.files().into_iter().map(|file| (file.start, file.end)).collect();
         Ok((plan.to_bytes(), plan.len(), groups, files))
@@ -311,8 +316,8 @@ pub(crate) fn tile_look(
         let plan = Plan::from_bytes(&plan)?;
         let bucket = from.bucket(&plan, bucket, &options)?;
         let mut renderer = choices.renderer(device)?;
-        let (preset, refine) = (choices.preset()?, choices.effort()?);
-        let (statistics, looked) = tiles::look(&plan, &bucket, renderer.as_mut(), preset, refine, watch)?;
+        let (asked, refine) = (choices.decibels()?, choices.effort()?);
+        let (statistics, looked) = tiles::look(&plan, &bucket, renderer.as_mut(), asked, refine, watch)?;
         let gpu = renderer.filter(Renderer::is_gpu).map(|renderer| renderer.name().to_owned());
         Ok((statistics.to_bytes(), looked.to_bytes(), gpu))
     })?;
@@ -411,7 +416,7 @@ pub(crate) fn tile_code(
     let (counts, coded) = without_gil(py, None, move |watch| {
         let (plan, coding) = (Plan::from_bytes(&plan)?, Coding::from_bytes(&coding)?);
         let (bucket, looked) = (from.bucket(&plan, bucket, &options)?, Looked::from_bytes(&looked)?);
-        let drawn = if choices.guess { None } else { Some(choices.preset()?) };
+        let drawn = if choices.guess { None } else { Some(choices.decibels()?) };
         let refine = choices.effort()?;
         let (counts, coded) = tiles::code(&plan, &coding, &bucket, &looked, drawn, refine, watch)?;
         Ok((counts.to_bytes(), coded.to_bytes()))
@@ -508,7 +513,7 @@ pub(crate) fn tile_whole(
         let joined = Joined::new(&named)?;
         let mut file = Vec::new();
         let renderer = choices.renderer(device)?;
-        let (options, decibels) = (choices.options(), choices.preset()?.decibels());
+        let (options, decibels) = (choices.options(), choices.decibels()?);
         let (refine, sink) = (choices.effort()?, (&mut file).into());
         let mut report = tiles::in_parts(&options, decibels, refine, renderer, &joined, sink, watch)?;
         report.source_bytes = bytes;
@@ -529,10 +534,12 @@ pub(crate) fn tile_choices(
     device(py, &choices.device)?;
     let check = || {
         let refine = [("refine", choices.effort()?.is_some())];
-        refuse(&[("guess", choices.guess)], &refine)?;
+        let psnr = [("psnr", choices.psnr.is_some())];
+        refuse(&[("preset", choices.preset.is_some())], &psnr)?;
+        refuse(&[("guess", choices.guess)], &[psnr[0], refine[0]])?;
         let keeps = [("keep_all", choices.keep_all), ("keep_order", choices.keep_order)];
         refuse(&refine, &[keeps[0], keeps[1], ("tol", choices.tol.is_some())])?;
-        choices.preset()?;
+        choices.decibels()?;
         Ok(choices.options().check()?)
     };
     check().map_err(|error: Error| raise(py, &error))

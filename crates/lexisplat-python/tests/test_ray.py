@@ -151,15 +151,15 @@ def test_a_small_scene_is_as_by_the_program(program: str, tmp_path: Path) -> Non
     assert (tmp_path / "by-ray.lexi").read_bytes() == made.read_bytes()
 
 
-def test_tiles_are_refined(few: list[Path], tmp_path: Path) -> None:
-    # Each tile is a bucket of its own.
-    of_each = [
-        lexisplat.ray.compress(few[:2], tmp_path / name, one_each=True, refine=refine)["files"]
-        for name, refine in [("refined", 0.005), ("plain", None)]
-    ]
-    for own, plain in zip(*of_each):
-        assert own["gaussians"] + own["removed"] == 500 and own["file_bytes"] < plain["file_bytes"]
-        assert len(lx.open(own["output"]).decode()) == own["gaussians"]
+def test_a_tile_has_the_quality_asked_for_and_is_refined(few: list[Path], tmp_path: Path) -> None:
+    def packed(name: str, **options: Any) -> dict[str, Any]:
+        # With one_each tasks work on the tile, though it is small.
+        return lexisplat.ray.compress(few[0], tmp_path / name, one_each=True, **options)["files"][0]
+
+    plain, coarse, refined = packed("plain", psnr=40), packed("coarse", psnr=32), packed("refined", psnr=40, refine=0.005)
+    for less in (coarse, refined):
+        assert less["file_bytes"] < plain["file_bytes"]
+        assert less["gaussians"] + less["removed"] == 500 and len(lx.open(less["output"]).decode()) == less["gaussians"]
 
 
 @pytest.fixture
@@ -238,6 +238,8 @@ def test_names_of_outputs_are_checked_before_any_work(few: list[Path], tmp_path:
         ({"tiles": few, "out": tmp_path / "city.lexi", "preset": "tiny"}, "preset"),
         ({"tiles": few, "out": tmp_path / "city.lexi", "tol": -1.0}, "tol = -1: a finite number above 0"),
         ({"tiles": few, "out": tmp_path / "city.lexi", "device": "auto"}, "cpu or gpu"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "psnr": 0.0}, "psnr = 0: a finite number above 0"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "psnr": 40, "preset": "small"}, "not together with preset"),
         ({"tiles": few, "out": tmp_path / "city.lexi", "refine": "slow"}, "quick, thorough"),
         ({"tiles": few, "out": tmp_path / "city.lexi", "refine": 1, "keep_all": True}, "not together with refine"),
         ({"tiles": few, "out": tmp_path / "city.lexi", "refine": 1, "guess": True}, "not together with guess"),

@@ -42,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     add("tiles", nargs="+", metavar="TILE", help="files of any format, patterns or folders; they may overlap")
     add("-o", "--output", required=True, metavar="PATH", help="the file, or with --one-each the folder")
     add("--preset", choices=["small", "balanced", "high", "archive"], help="about 35, 40, 45 or 54 dB of PSNR [balanced]")
+    add("--psnr", type=float, metavar="DB", help="any other quality, in dB of PSNR")
     add("--tol", type=float, metavar="T", help="largest L2 norm of the error of a Gaussian's SH vector")
     add("--atoms", type=int, metavar="M", help="atoms of the dictionary, 1 to 1024")
     add("--seed", type=int, default=0, metavar="N", help="seed of the choice of Gaussians to learn from [0]")
@@ -91,7 +92,7 @@ def _run(given: argparse.Namespace) -> dict[str, Any]:
     here = {} if given.address else {"num_cpus": given.workers, "include_dashboard": False}
     ray.init(address=given.address or "local", log_to_driver=False, logging_level="error", **here)
     passed = (
-        "preset tol atoms seed keep_order keep_all lod refine guess device one_each skip_bad drop_invalid drop_extras overwrite threads"
+        "preset psnr tol atoms seed keep_order keep_all lod refine guess device one_each skip_bad drop_invalid drop_extras overwrite threads"
     )
     options = {name: getattr(given, name) for name in passed.split()}
     with warnings.catch_warnings():

@@ -39,6 +39,7 @@ def compress(
     out: str | os.PathLike[str],
     *,
     preset: Preset | None = None,
+    psnr: float | None = None,
     tol: float | None = None,
     atoms: int | None = None,
     seed: int = 0,
@@ -70,7 +71,7 @@ def compress(
         ``opacities``, ``sh0`` and ``shN`` as the attributes of :class:`lexisplat.Splats`.
     out : path
         The file to write, by the process that calls; with ``one_each`` a folder, where each tile's file has its name.
-    preset, tol, atoms, seed, keep_order, keep_all, lod, refine, guess, device
+    preset, psnr, tol, atoms, seed, keep_order, keep_all, lod, refine, guess, device
         As :func:`lexisplat.compress`. ``device`` is that of the workers. All parts together take the minutes of ``refine``, on one
         thread.
     one_each : bool
@@ -104,7 +105,7 @@ def compress(
     reading = {"drop_invalid": drop_invalid, "drop_extras": drop_extras}
     for name, value in {**flags, **reading}.items():
         flag(name, value)
-    asked = {"preset": preset, "tol": tol, "atoms": atoms, "seed": seed}
+    asked: dict[str, Any] = {"preset": preset, "psnr": psnr, "tol": tol, "atoms": atoms, "seed": seed}
     asked.update(keep_order=keep_order, keep_all=keep_all, lod=lod, refine=refine, guess=guess)
     choices = {**options_of(asked), **reading, "device": device_of(device)}
     limits, threads = limits_of(limit), count("threads", threads)
