@@ -166,12 +166,6 @@ fn found_views(splats: &Splats) -> ViewCounts {
     ViewCounts { measuring, judging }
 }
 
-/// Returns the found views, and rounds of views near them. Of sharp pictures only some squares are drawn.
-fn rounds_nearby(splats: &Splats, found: Vec<Camera>) -> Vec<Camera> {
-    let rounds = nearby(&splats.geometry, &found, REFINED_NEARBY);
-    std::iter::once(found).chain(rounds).flat_map(|round| sampled(round, REFINED_PIXELS)).collect()
-}
-
 /// The views that packing draws: some measure the sensitivity, some judge the result. About half of each show the scene over black,
 /// the others over white.
 #[derive(Debug, Clone)]
@@ -365,35 +359,38 @@ impl PackingViews {
         splats: &Splats,
         progress: &dyn Progress,
     ) -> Result<(Self, Vec<Camera>)> {
-        let mut fitted = Vec::new();
-        if self.given {
-            let stride = (self.judging.len() / REFINED_JUDGES).clamp(1, REFINED_JUDGE_SHARE);
-            self.judging = self.judging.into_iter().step_by(stride).collect();
-            for (rank, share) in REFINED_BETWEEN {
-                fitted.extend(between(&self.measuring, rank, share));
-            }
-            fitted.extend(aside(&splats.geometry, &self.measuring, ASIDE));
-            let found = Self::found(renderer, splats, progress)?.measuring;
-            let stride = found.len().div_ceil(REFINED_FOUND).max(1);
-            self.measuring.extend(found.into_iter().step_by(stride));
+        if !self.given {
+            let fitted = self.refining_found(splats);
+            return Ok((self, fitted));
         }
-        fitted.extend(self.measuring.iter().filter(|camera| !self.judging.contains(camera)).cloned());
-        let fitted = match self.given {
-            true => sampled_again(fitted, REFINED_PIXELS, MOST_REFINED_PIXELS),
-            false => rounds_nearby(splats, fitted),
-        };
-        Ok((self, fitted))
+        let mut fitted = Vec::new();
+        let stride = (self.judging.len() / REFINED_JUDGES).clamp(1, REFINED_JUDGE_SHARE);
+        self.judging = self.judging.into_iter().step_by(stride).collect();
+        for (rank, share) in REFINED_BETWEEN {
+            fitted.extend(between(&self.measuring, rank, share));
+        }
+        fitted.extend(aside(&splats.geometry, &self.measuring, ASIDE));
+        let found = Self::found(renderer, splats, progress)?.measuring;
+        let stride = found.len().div_ceil(REFINED_FOUND).max(1);
+        self.measuring.extend(found.into_iter().step_by(stride));
+        fitted.extend(self.not_judging().cloned());
+        Ok((self, sampled_again(fitted, REFINED_PIXELS, MOST_REFINED_PIXELS)))
     }
 
-    /// Returns the views to which everything of a part of a scene is fitted, like [`Self::for_refining`] of found views.
-    pub(crate) fn refined_part(&self, part: &Splats) -> Vec<Camera> {
-        let fitted = self.measuring.iter().filter(|camera| !self.judging.contains(camera));
-        rounds_nearby(part, fitted.cloned().collect())
+    /// Returns the views to which everything of a scene or of a part is fitted if the views were found, round after round.
+    pub(crate) fn refining_found(&self, splats: &Splats) -> Vec<Camera> {
+        let found: Vec<Camera> = self.not_judging().cloned().collect();
+        let rounds = nearby(&splats.geometry, &found, REFINED_NEARBY);
+        std::iter::once(found).chain(rounds).flat_map(|round| sampled(round, REFINED_PIXELS)).collect()
+    }
+
+    /// Returns the views that measure and do not judge.
+    fn not_judging(&self) -> impl Iterator<Item = &Camera> {
+        self.measuring.iter().filter(|camera| !self.judging.contains(camera))
     }
 
     fn fitting_to(&self, splats: &Splats, pixels: u64) -> Vec<Camera> {
-        let free: Vec<&Camera> =
-            self.measuring.iter().filter(|camera| !self.judging.contains(camera)).collect();
+        let free: Vec<&Camera> = self.not_judging().collect();
         let [most, around] = if self.given { [FITTED_GIVEN, FITTED_AROUND] } else { [FITTED_FOUND, 0] };
         let stride = free.len().div_ceil(most).max(1);
         let mut views: Vec<Camera> = free.into_iter().step_by(stride).cloned().collect();

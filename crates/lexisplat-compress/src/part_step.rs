@@ -4,7 +4,7 @@ use lexisplat::packed::Packer;
 use lexisplat::{Progress, Splats};
 use lexisplat_render::{Camera, Renderer, Scene};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::judge::{Judge, Score};
 use crate::target::{DB_PER_HALVING, Try, on_grid};
 
@@ -23,8 +23,10 @@ const MOST_MOVE: f64 = 2.0;
 
 /// The views that judge a part of a scene.
 pub(crate) struct PartJudge {
-    /// The views like photographs, and the views evenly spread over the part, with the amount by which these may show less.
-    judges: Vec<(Judge, f64)>,
+    /// Judges by views like photographs.
+    photographs: Judge,
+    /// Judges by views evenly spread over the part.
+    even: Option<Judge>,
 }
 
 impl PartJudge {
@@ -39,14 +41,11 @@ impl PartJudge {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let of = |views: &[Camera]| Judge::of_part(Renderer::cpu(), part, views, progress);
-        let mut judges = vec![(of(judging)?, 0.0)];
-        if !even.is_empty() {
-            judges.push((of(even)?, EVEN_MARGIN));
-        }
-        Ok(Self { judges })
+        let even = if even.is_empty() { None } else { Some(of(even)?) };
+        Ok(Self { photographs: of(judging)?, even })
     }
 
-    /// Returns the lower of the scores.
+    /// Returns the score over views like photographs, or the one over evenly spread views plus [`EVEN_MARGIN`] if this is lower.
     ///
     /// # Errors
     /// As [`Judge::score`].
@@ -56,13 +55,11 @@ impl PartJudge {
         progress: &dyn Progress,
     ) -> Result<Score> {
         let scene = scene.into();
-        let mut least: Option<Score> = None;
-        for (judge, margin) in &mut self.judges {
-            let Score { judged, mean, least: worst } = judge.score(scene, progress)?;
-            let own = Score { judged: judged + *margin, mean: mean + *margin, least: worst + *margin };
-            least = Some(least.filter(|other| other.judged <= own.judged).unwrap_or(own));
-        }
-        least.ok_or_else(|| Error::parameter("views", 0, "at least one that judges"))
+        let usual = self.photographs.score(scene, progress)?;
+        let Some(even) = &mut self.even else { return Ok(usual) };
+        let Score { judged, mean, least } = even.score(scene, progress)?;
+        let [judged, mean, least] = [judged, mean, least].map(|decibels| decibels + EVEN_MARGIN);
+        Ok(if judged < usual.judged { Score { judged, mean, least } } else { usual })
     }
 }
 

@@ -69,7 +69,7 @@ impl Observer<Error> for Drawn<'_> {
     }
 
     fn refit(&mut self, of: ToRefit<'_, '_>) -> Result<Option<Vec<Appearance>>> {
-        self.parts.refit(of, self.progress).map(Some)
+        refit(of, self.parts.refine, self.parts.gaussians, self.progress).map(Some)
     }
 
     fn device(&self) -> Option<String> {
@@ -114,9 +114,9 @@ impl Parts<'_> {
         let mut judge = PartJudge::new(part, [&views.judging_part(), &even], progress)?;
         let (instead, sensitivity, gain, report) = match self.refine {
             Some(effort) => {
-                let refining = self.refining(effort, &views, part, progress)?;
-                let fit = Fit::to(part, views.fitting_part(part), false, progress)?.keeping(0);
-                let fit = &fit.before_refining();
+                let effort = effort.of_part(part.len(), self.gaussians);
+                let refining = Refining::to(part, views.refining_found(part), effort, progress)?;
+                let fit = &fit_to(part, &views, progress)?.before_refining();
                 let mut removal = Removal { views: &views, renderer, fit, progress };
                 let packing = Packing::new(Target::MeanPsnr(decibels)).with_options(options.clone());
                 let score = &mut |splats: &Splats| judge.score(splats, progress);
@@ -137,34 +137,32 @@ impl Parts<'_> {
         let step_factor = step / usual;
         Ok((Observed { instead, sensitivity, step_factor, memo }, report))
     }
+}
 
-    /// Returns base colours and opacities that are fitted to pictures of the part alone. The memo is that of [`Self::observe`].
-    ///
-    /// # Errors
-    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`Error::Codec`].
-    pub(crate) fn refit(&self, of: ToRefit<'_, '_>, progress: &dyn Progress) -> Result<Vec<Appearance>> {
-        let ToRefit { part, model, quantised, sensitivities, step, memo } = of;
-        let progress = &OnlyCancels(progress);
-        let views = views_of(memo)?;
-        if let Some(effort) = self.refine {
-            let refining = self.refining(effort, &views, part, progress)?;
-            let cost = RestCost::new(sensitivities.iter().map(|s| s.colour), step);
-            return refined(&refining, quantised, model.into_splats(), &cost, progress);
-        }
-        // Parts are for scenes that leave little memory, so nothing is kept.
-        let fit = Fit::to(part, views.fitting_part(part), false, progress)?.keeping(0);
-        fit.appearances(Scene::from(&model), &sensitivities, progress)
+/// Returns base colours and opacities that are fitted to pictures of the part alone. If parts are refined, SH-rest is fitted too. The
+/// memo is that of [`Parts::observe`]. The whole scene has `gaussians` Gaussians.
+///
+/// # Errors
+/// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`Error::Codec`].
+pub(crate) fn refit(
+    ToRefit { part, model, quantised, sensitivities, step, memo }: ToRefit<'_, '_>,
+    refine: Option<Refine>,
+    gaussians: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<Appearance>> {
+    let progress = &OnlyCancels(progress);
+    let views = views_of(memo)?;
+    if let Some(effort) = refine {
+        let effort = effort.of_part(part.len(), gaussians);
+        let refining = Refining::to(part, views.refining_found(part), effort, progress)?;
+        let cost = RestCost::new(sensitivities.iter().map(|s| s.colour), step);
+        return refined(&refining, quantised, model.into_splats(), &cost, progress);
     }
+    fit_to(part, &views, progress)?.appearances(Scene::from(&model), &sensitivities, progress)
+}
 
-    /// Draws the pictures of `part` that its Gaussians are refined to.
-    fn refining(
-        &self,
-        effort: Refine,
-        views: &PackingViews,
-        part: &Splats,
-        progress: &dyn Progress,
-    ) -> Result<Refining> {
-        let effort = effort.of_part(part.len(), self.gaussians);
-        Refining::to(part, views.refined_part(part), effort, progress)
-    }
+/// Draws the pictures of `part` that base colours and opacities are fitted to. Parts are for scenes that leave little memory, so
+/// nothing is kept from one step of a fit to the next.
+fn fit_to(part: &Splats, views: &PackingViews, progress: &dyn Progress) -> Result<Fit> {
+    Ok(Fit::to(part, views.fitting_part(part), false, progress)?.keeping(0))
 }

@@ -1,14 +1,14 @@
 //! The steps of [`lexisplat::packed::tiles`] that draw.
 
 use lexisplat::Progress;
-use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
 use lexisplat::packed::ToRefit;
+use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
 use lexisplat_render::Renderer;
 
 use crate::effort::Refine;
 use crate::error::Result;
-use crate::parts::Parts;
 pub use crate::parts::in_parts;
+use crate::parts::{Parts, refit};
 
 /// Measures the sensitivity of a bucket with `renderer`, for a PSNR of about `decibels`, and refines its Gaussians if there
 /// is `refine`. Without a renderer the sensitivity is guessed from each Gaussian alone.
@@ -24,14 +24,14 @@ pub fn look(
     refine: Option<Refine>,
     progress: &dyn Progress,
 ) -> Result<(LookStatistics, Looked)> {
-    let parts = parts(plan, decibels, refine);
+    let parts = Parts { options: plan.options(), decibels, refine, gaussians: plan.len() };
     let observe = |renderer| parts.observe(renderer, bucket.splats(), progress);
     let observed = renderer.map(observe).transpose()?;
     Ok(bucket.look(plan, observed.map(|(observed, _)| observed))?)
 }
 
-/// Codes a bucket. With `drawn`, the decibels for which its sensitivity was measured in pictures, the file is fitted to pictures: base
-/// colours and opacities, and with `refine` SH-rest.
+/// Codes a bucket. If its sensitivity was not `guessed`, the file is fitted to pictures: base colours and opacities, and with
+/// `refine` SH-rest.
 ///
 /// # Errors
 /// As [`Coding::code`], and errors of drawing.
@@ -40,19 +40,10 @@ pub fn code(
     coding: &Coding,
     bucket: &Bucket,
     looked: &Looked,
-    drawn: Option<f64>,
+    guessed: bool,
     refine: Option<Refine>,
     progress: &dyn Progress,
 ) -> Result<(Counts, Coded)> {
-    let Some(decibels) = drawn else {
-        return coding.code(plan, bucket, looked, None, progress);
-    };
-    let parts = parts(plan, decibels, refine);
-    let mut refit = |of: ToRefit<'_, '_>| parts.refit(of, progress).map(Some);
-    coding.code(plan, bucket, looked, Some(&mut refit), progress)
-}
-
-fn parts(plan: &Plan, decibels: f64, refine: Option<Refine>) -> Parts<'_> {
-    let (options, gaussians) = (plan.options(), plan.len());
-    Parts { options, decibels, refine, gaussians }
+    let mut fit = |of: ToRefit<'_, '_>| refit(of, refine, plan.len(), progress).map(Some);
+    coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut fit) }, progress)
 }

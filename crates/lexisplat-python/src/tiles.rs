@@ -3,11 +3,11 @@
 
 use std::path::{Path, PathBuf};
 
+use lexisplat::packed::PackOptions;
 use lexisplat::packed::tiles::{
     Assembly, Bucket, BucketReader, Coded, Coding, Counts, LookStatistics, Looked, Plan, Sample,
     SampleStatistics, Steps, Survey, Tables,
 };
-use lexisplat::packed::PackOptions;
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Joined, Silent, SplatSource, Splats};
 use lexisplat_compress::{CompressionReport, Error, Quality, Refine, Target, tiles};
@@ -416,9 +416,8 @@ pub(crate) fn tile_code(
     let (counts, coded) = without_gil(py, None, move |watch| {
         let (plan, coding) = (Plan::from_bytes(&plan)?, Coding::from_bytes(&coding)?);
         let (bucket, looked) = (from.bucket(&plan, bucket, &options)?, Looked::from_bytes(&looked)?);
-        let drawn = if choices.guess { None } else { Some(choices.decibels()?) };
         let refine = choices.effort()?;
-        let (counts, coded) = tiles::code(&plan, &coding, &bucket, &looked, drawn, refine, watch)?;
+        let (counts, coded) = tiles::code(&plan, &coding, &bucket, &looked, choices.guess, refine, watch)?;
         Ok((counts.to_bytes(), coded.to_bytes()))
     })?;
     Ok((made(py, counts), made(py, coded)))
