@@ -36,6 +36,8 @@ const MOST_WHOLE_REFINED: u64 = BUCKET as u64;
 
 /// Name of [`Packing::with_max_gaussians`] in errors.
 const MAX_GAUSSIANS: &str = "max-gaussians";
+/// Name of [`Packing::with_refine`] in errors about memory.
+const REFINE_WITH_CAMERAS: &str = "refine with cameras";
 
 /// The choices of a compression.
 #[derive(Debug, Clone)]
@@ -124,7 +126,8 @@ impl From<Target> for Quality {
 /// The choices of packing a scene by its pictures.
 ///
 /// A scene that is large, or needs more than the memory allowed, is packed part by part, with views of each part. Some
-/// choices need the whole scene: given cameras, viewpoints, a limit of Gaussians, and targets other than a mean PSNR.
+/// choices need the whole scene: given cameras, viewpoints, a limit of Gaussians, refining with cameras, and targets other than a
+/// mean PSNR.
 #[derive(Debug, Clone)]
 pub struct Packing {
     pub(crate) quality: Quality,
@@ -269,7 +272,10 @@ impl Packing {
         let grows = u128::from(bytes) * u128::from(per_ten_bytes) / 10;
         let needed = u64::try_from(grows).unwrap_or(u64::MAX).saturating_add(fixed);
         let fits = needed <= self.memory;
-        match self.needs_whole() {
+        // A scene in parts ignores cameras that lie beside it. Refining gains much less without them, so a scene with cameras is
+        // not refined in parts.
+        let with_cameras = self.refine.filter(|_| cameras).map(|_| REFINE_WITH_CAMERAS);
+        match self.needs_whole().or(with_cameras) {
             Some(choice) if !fits => Err(Error::Memory { choice, needed, allowed: self.memory }),
             Some(_) => Ok(true),
             None => Ok(fits && (cameras || gaussians <= most)),
@@ -313,7 +319,11 @@ mod tests {
             assert!(matches!(packing.is_whole(large, bytes, false), Err(Error::Memory { .. })));
         }
         let refined = Packing::default().with_refine(Refine::Quick).with_memory(8 * bytes);
-        assert!(!refined.is_whole(large, bytes, true).unwrap());
+        assert!(!refined.is_whole(large, bytes, false).unwrap());
+        assert!(matches!(
+            refined.is_whole(large, bytes, true),
+            Err(Error::Memory { choice: REFINE_WITH_CAMERAS, .. })
+        ));
         let few = MOST_WHOLE_REFINED;
         assert!(refined.is_whole(few, 248 * few, false).unwrap());
         assert!(!refined.is_whole(few + 1, 248 * (few + 1), false).unwrap());

@@ -3,6 +3,7 @@
 use crate::packed::{Appearance, PackOptions, ToRefit};
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::Splats;
+use crate::scene::tile_kind::TileKind;
 use crate::support::error::{Error, Result};
 
 /// A renderer that draws the parts of a scene. A part holds about 262,144 Gaussians near each other, and is drawn as if it
@@ -47,11 +48,17 @@ pub struct Observed {
 }
 
 impl Observed {
-    /// Refuses a step factor that is not finite and above 0, and other Gaussians than those of the part if all must stay.
-    pub(crate) fn check(&self, options: &PackOptions) -> Result<()> {
-        if self.instead.is_some() && !options.may_change() {
-            let expected = "those of the part, with keep_all, keep_order or a tolerance";
-            return Err(Error::parameter("Gaussians", "others", expected));
+    /// Refuses a step factor that is not finite and above 0. Refuses other Gaussians than those of `part` if all must stay, or if
+    /// they have other properties.
+    pub(crate) fn check(&self, part: &Splats, options: &PackOptions) -> Result<()> {
+        if let Some(instead) = &self.instead {
+            if !options.may_change() {
+                let expected = "those of the part, with keep_all, keep_order or a tolerance";
+                return Err(Error::parameter("Gaussians", "others", expected));
+            }
+            if let Some(difference) = TileKind::of(part).difference(&TileKind::of(instead)) {
+                return Err(Error::parameter("Gaussians", difference, "the properties of the part"));
+            }
         }
         match self.step_factor.is_finite() && self.step_factor > 0.0 {
             true => Ok(()),

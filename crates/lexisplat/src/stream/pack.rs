@@ -76,7 +76,7 @@ fn whole<E: From<Error>>(
         }
     };
     progress.end();
-    observed.check(options)?;
+    observed.check(&splats, options)?;
     let Observed { instead, sensitivity, step_factor, memo } = observed;
     let part = splats.as_ref();
     let packer = Packer::new(instead.as_ref().unwrap_or(part), &sensitivity, options)?;

@@ -224,6 +224,12 @@ fn other_gaussians_are_packed_instead_of_a_part() {
     let mut told = Told::by(|part: &Splats| Ok(moved_half(part)));
     let error = streamed(&splats, Some(&mut told), 3000).unwrap_err().to_string();
     assert!(error.contains("keep_order"), "{error}");
+    let mut told = Told::by(|part: &Splats| {
+        let instead = part.clone().with_degree_cut(crate::ShDegree::new(0).unwrap());
+        Ok(Observed { instead: Some(instead), ..Sensitivity::guess(&part.geometry).into() })
+    });
+    let error = streamed_with(&splats, Some(&mut told), &options, 3000).unwrap_err().to_string();
+    assert!(error.contains("SH degree 0"), "{error}");
 }
 
 #[test]

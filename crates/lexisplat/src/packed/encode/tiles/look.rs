@@ -72,7 +72,7 @@ impl Bucket {
                 (Sensitivity::guess_of_part(&self.splats.geometry, total).into(), 1.0)
             }
             Some(mut observed) => {
-                observed.check(&plan.options)?;
+                observed.check(&self.splats, &plan.options)?;
                 let share = self.splats.len() as f64 / plan.len().max(1) as f64;
                 // All parts have one overall step. A part that asks for half of that step gets four times the
                 // sensitivities instead.
