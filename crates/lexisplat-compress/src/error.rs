@@ -44,7 +44,7 @@ pub enum Error {
         expected: String,
     },
     /// A choice needs the whole scene in memory, and the memory allowed is too small for it. Allow more memory, or choose a
-    /// preset or a mean PSNR, with which a scene can be packed in parts.
+    /// preset or a mean PSNR without cameras, with which a scene can be packed in parts.
     #[error("memory = {allowed}: at least {needed} bytes, because {choice} needs the whole scene at once")]
     Memory {
         /// The choice that needs the whole scene.

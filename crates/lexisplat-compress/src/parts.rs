@@ -52,7 +52,7 @@ struct Drawn<'a> {
     parts: Parts<'a>,
     progress: &'a dyn Progress,
     look_seconds: f64,
-    /// What refining reached, of all parts until now.
+    /// The result of refining all parts until now.
     refined: Option<RefineReport>,
 }
 

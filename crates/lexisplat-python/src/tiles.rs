@@ -532,12 +532,15 @@ pub(crate) fn tile_choices(
     choices.reading(py, limit)?;
     device(py, &choices.device)?;
     let check = || {
-        let refine = [("refine", choices.effort()?.is_some())];
-        let psnr = [("psnr", choices.psnr.is_some())];
-        refuse(&[("preset", choices.preset.is_some())], &psnr)?;
-        refuse(&[("guess", choices.guess)], &[psnr[0], refine[0]])?;
-        let keeps = [("keep_all", choices.keep_all), ("keep_order", choices.keep_order)];
-        refuse(&refine, &[keeps[0], keeps[1], ("tol", choices.tol.is_some())])?;
+        let (psnr, refine) = (("psnr", choices.psnr.is_some()), ("refine", choices.effort()?.is_some()));
+        refuse(&[("preset", choices.preset.is_some())], &[psnr])?;
+        refuse(&[("guess", choices.guess)], &[psnr, refine])?;
+        let keeping = [
+            ("keep_all", choices.keep_all),
+            ("keep_order", choices.keep_order),
+            ("tol", choices.tol.is_some()),
+        ];
+        refuse(&[refine], &keeping)?;
         choices.decibels()?;
         Ok(choices.options().check()?)
     };

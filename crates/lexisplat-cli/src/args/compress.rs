@@ -141,9 +141,9 @@ pub(crate) struct Compress {
     #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "views"])]
     pub(crate) guess: bool,
     /// Approximate memory for packing a whole scene, such as 500MB. A scene that needs more is packed in parts, and
-    /// each part is drawn on its own. So is a scene of more than 786,432 Gaussians without cameras. A scene in parts
-    /// has only the targets --preset and --psnr. Packing in parts takes up to 1.5 GiB, however small BYTES is. Files of
-    /// the other layouts do not depend on this option.
+    /// each part is drawn on its own. So is a scene of more than 786,432 Gaussians without cameras, or of more than
+    /// 262,144 with --refine. A scene in parts has only the targets --preset and --psnr. Packing in parts takes up to
+    /// 1.5 GiB, however small BYTES is. Files of the other layouts do not depend on this option.
     #[arg(long, default_value = "4GiB", value_name = "BYTES", value_parser = size)]
     pub(crate) memory: u64,
     /// Device that draws the scene: `cpu`, `gpu`, `auto` (a GPU if there is one that is not emulated in software,

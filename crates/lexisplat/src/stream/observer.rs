@@ -53,7 +53,7 @@ impl Observed {
     pub(crate) fn check(&self, part: &Splats, options: &PackOptions) -> Result<()> {
         if let Some(instead) = &self.instead {
             if !options.may_change() {
-                let expected = "those of the part, with keep_all, keep_order or a tolerance";
+                let expected = "the Gaussians of the part, with keep_all, keep_order or a tolerance";
                 return Err(Error::parameter("Gaussians", "others", expected));
             }
             if let Some(difference) = TileKind::of(part).difference(&TileKind::of(instead)) {

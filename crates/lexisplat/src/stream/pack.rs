@@ -89,7 +89,7 @@ fn whole<E: From<Error>>(
     let observation = Observation { part, step, scale: 1.0, memo: &memo };
     let appearances = quantised.refitted(refit, &observation, progress)?;
     let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
-    let removed = (part.len() - packed.len().min(part.len())) as u64;
+    let removed = part.len().saturating_sub(packed.len()) as u64;
     let packed = packed.with_device(device).with_removed(removed);
     let writer = LexiWriter::packed(&packed);
     let tensor_bytes = writer.tensor_bytes().to_vec();

@@ -49,7 +49,7 @@ pub struct ToRefit<'r, 'q> {
     pub memo: &'r [u8],
 }
 
-/// What a part was packed from, and how.
+/// The source of a part that is packed, and its overall step.
 pub(crate) struct Observation<'r> {
     /// The part as the source has it.
     pub(crate) part: &'r Splats,

@@ -66,7 +66,14 @@ impl<'p> BucketReader<'p> {
     /// # Errors
     /// [`Error::Parameter`] if `bytes` are not a piece of this bucket and this scene.
     pub fn add_piece(&mut self, bytes: &[u8]) -> Result<()> {
-        let Piece { plan_id, bucket, keys, rows } = Piece::from_bytes(bytes)?;
+        self.add_read(Piece::from_bytes(bytes)?)
+    }
+
+    /// Adds a piece of the bucket.
+    ///
+    /// # Errors
+    /// As [`Self::add_piece`].
+    pub(super) fn add_read(&mut self, Piece { plan_id, bucket, keys, rows }: Piece) -> Result<()> {
         self.plan.check("piece", [plan_id], None)?;
         if bucket != self.bucket.number {
             return Err(Error::parameter(

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Serialize};
 
-use super::bucket::Bucket;
+use super::bucket::{Bucket, BucketReader};
 use super::message::messages;
-use super::plan::Plan;
+use super::plan::{Piece, Plan};
 use crate::packed::bitstream::PointsOfView;
 use crate::packed::encode::fit::{ColourMoments, Derivatives};
 use crate::packed::encode::octaves::{Histogram, RoundedSensitivities};
@@ -34,8 +34,8 @@ pub struct Looked {
     stays: Vec<u8>,
     scale: f32,
     memo: Vec<u8>,
-    /// The rows of the Gaussians that are packed instead of the bucket's, in the order of the file.
-    instead: Option<Vec<u8>>,
+    /// The Gaussians that are packed instead of the bucket's.
+    instead: Option<Piece>,
 }
 
 /// Sums over the Gaussians of a bucket.
@@ -95,7 +95,8 @@ impl Bucket {
         let (statistics, looked) = LookStatistics::of(&bucket, &sensitivity, plan);
         let mut rows = Vec::new();
         RowLayout::new(plan.empty()).pack(&mut bucket.splats, &mut rows);
-        Ok((statistics, Looked { scale, memo, instead: Some(rows), ..looked }))
+        let instead = Piece { plan_id: plan.id(), bucket: self.number, keys: bucket.keys, rows };
+        Ok((statistics, Looked { scale, memo, instead: Some(instead), ..looked }))
     }
 }
 
@@ -157,23 +158,20 @@ impl Looked {
         }
     }
 
-    /// Returns what the Gaussians of `bucket` were packed from.
+    /// Returns the source of the Gaussians of `bucket` that are packed, and their overall step.
     pub(super) fn observation<'r>(&'r self, plan: &Plan, bucket: &'r Bucket) -> Observation<'r> {
         Observation { part: &bucket.splats, step: plan.step, scale: self.scale, memo: &self.memo }
     }
 
-    /// Returns the Gaussians that are packed: those of `bucket`, or those instead.
+    /// Returns the Gaussians that are packed: the Gaussians of `bucket`, or others instead.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the rows of the latter are damaged.
+    /// [`Error::Parameter`] if the others are not of `bucket`.
     pub(super) fn packed<'b>(&self, plan: &Plan, bucket: &'b Bucket) -> Result<Cow<'b, Bucket>> {
-        let Some(rows) = &self.instead else { return Ok(Cow::Borrowed(bucket)) };
-        let layout = RowLayout::new(plan.empty());
-        if !rows.len().is_multiple_of(layout.bytes()) {
-            let expected = format!("rows of {} bytes", layout.bytes());
-            return Err(Error::parameter("looked", format!("{} bytes", rows.len()), expected));
-        }
-        Ok(Cow::Owned(bucket.with(plan, &layout.unpack(rows)).0))
+        let Some(piece) = &self.instead else { return Ok(Cow::Borrowed(bucket)) };
+        let mut reader = BucketReader::new(plan, bucket.number);
+        reader.add_read(piece.clone())?;
+        Ok(Cow::Owned(reader.finish()))
     }
 
     /// Returns the sensitivities of each Gaussian, and whether it stays. With `first_stays`, the first Gaussian stays in any
