@@ -8,11 +8,13 @@ use crate::error::{Error, Result};
 pub(crate) const REFINE: &str = "refine";
 /// Steps of the fit of all values with [`Refine::Quick`] and [`Refine::Thorough`].
 const QUICK: usize = 800;
-const THOROUGH: usize = 2000;
+const THOROUGH: usize = 3200;
+/// Number of these steps from which more Gaussians can go, because the steps win back more.
+const MANY: usize = 2000;
 /// Amounts by which the quality of the Gaussians that stay may fall short of the quality asked for before the first fit, in dB,
-/// with given cameras. More steps win back more, so more Gaussians can go from [`THOROUGH`] steps on.
-const QUICK_BELOW: f64 = 1.8;
-const THOROUGH_BELOW: f64 = 2.5;
+/// with given cameras: of less than [`MANY`] steps, and of others.
+const FEW_BELOW: f64 = 1.8;
+const MANY_BELOW: f64 = 2.5;
 /// Steps of the other two fits, as shares of the steps of the first.
 const RADIANCE: f64 = 0.6;
 const APPEARANCE: f64 = 0.2;
@@ -30,7 +32,7 @@ const MOST: f64 = 1e7;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Refine {
-    /// Two fifths of the steps of [`Self::Thorough`]. With given cameras more Gaussians stay.
+    /// A quarter of the steps of [`Self::Thorough`]. With given cameras more Gaussians stay.
     Quick,
     /// The steps after which more gain little.
     Thorough,
@@ -69,7 +71,7 @@ impl RefineSteps {
     /// Returns the amount by which the quality of the Gaussians that stay may fall short of the quality asked for before the
     /// first fit, in dB, with given cameras.
     pub(crate) fn below(self) -> f64 {
-        if self.all < THOROUGH { QUICK_BELOW } else { THOROUGH_BELOW }
+        if self.all < MANY { FEW_BELOW } else { MANY_BELOW }
     }
 }
 

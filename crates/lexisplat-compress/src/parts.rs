@@ -36,11 +36,12 @@ pub fn in_parts(
     let clock = Stopwatch::start();
     let parts = Parts { options, decibels, refine, gaussians: source.len() };
     let mut drawn =
-        renderer.map(|renderer| Drawn { renderer, parts, progress, look_seconds: 0.0, refined: None });
+        renderer.map(|renderer| Drawn { renderer, parts, progress, look_seconds: 0.0, refined: Vec::new() });
     let guessed = drawn.is_none();
     let observer = drawn.as_mut().map(|drawn| drawn as &mut dyn Observer<Error>);
     let done = stream::pack(source, observer, options, decibels, sink, progress)?;
-    let (look_seconds, refined) = drawn.map_or((0.0, None), |drawn| (drawn.look_seconds, drawn.refined));
+    let (look_seconds, refined) =
+        drawn.map_or((0.0, None), |drawn| (drawn.look_seconds, RefineReport::of_parts(drawn.refined)));
     let pack_seconds = clock.seconds() - look_seconds;
     let report = CompressionReport::in_parts(&done, guessed);
     Ok(CompressionReport { look_seconds, pack_seconds, refined, ..report })
@@ -52,8 +53,8 @@ struct Drawn<'a> {
     parts: Parts<'a>,
     progress: &'a dyn Progress,
     look_seconds: f64,
-    /// The result of refining all parts until now.
-    refined: Option<RefineReport>,
+    /// The results of refining the parts until now.
+    refined: Vec<RefineReport>,
 }
 
 impl Observer<Error> for Drawn<'_> {
@@ -61,10 +62,7 @@ impl Observer<Error> for Drawn<'_> {
         let clock = Stopwatch::start();
         let (observed, refined) = self.parts.observe(&mut self.renderer, part, self.progress)?;
         self.look_seconds += clock.seconds();
-        self.refined = match (self.refined.take(), refined) {
-            (Some(before), Some(own)) => Some(before.with_part(own)),
-            (before, own) => before.or(own),
-        };
+        self.refined.extend(refined);
         Ok(observed)
     }
 

@@ -3,7 +3,7 @@
 use lexisplat::packed::{PackedHead, ReachedRecord, TargetRecord};
 use lexisplat::stream::{Compressed, PackedFile};
 use lexisplat::{CompressReport, Dictionary, Layout, Record, ShDegree};
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::facts::{ByteCount, ROUNDING, RecordReport, attribute_bytes, sh_bytes};
 use crate::target::MIN_PSNR;
@@ -116,7 +116,7 @@ pub fn overshoot(target: &TargetRecord) -> Option<f64> {
 
 /// The result of refining, before quantisation. Of a scene in parts, numbers are sums over the parts, and decibels are means over
 /// the Gaussians.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct RefineReport {
     /// Number of steps of the fit of all values.
@@ -130,8 +130,13 @@ pub struct RefineReport {
 }
 
 impl RefineReport {
-    /// Adds the result of the next part.
-    pub(crate) fn with_part(self, next: Self) -> Self {
+    /// Returns the result of all `parts`, in their order; `None` if there are none.
+    #[must_use]
+    pub fn of_parts(parts: impl IntoIterator<Item = Self>) -> Option<Self> {
+        parts.into_iter().reduce(Self::with_part)
+    }
+
+    fn with_part(self, next: Self) -> Self {
         let gaussians = self.gaussians + next.gaussians;
         let share = next.gaussians as f64 / gaussians.max(1) as f64;
         let mean = |before: f64, own: f64| before + share * (own - before);

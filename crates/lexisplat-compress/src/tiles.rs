@@ -9,9 +9,10 @@ use crate::effort::Refine;
 use crate::error::Result;
 pub use crate::parts::in_parts;
 use crate::parts::{Parts, refit};
+use crate::report::RefineReport;
 
 /// Measures the sensitivity of a bucket with `renderer`, for a PSNR of about `decibels`, and refines its Gaussians if there
-/// is `refine`. Without a renderer the sensitivity is guessed from each Gaussian alone.
+/// is `refine`. The last value is the result of refining. Without a renderer the sensitivity is guessed from each Gaussian alone.
 ///
 /// # Errors
 /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the bucket does not
@@ -23,11 +24,12 @@ pub fn look(
     decibels: f64,
     refine: Option<Refine>,
     progress: &dyn Progress,
-) -> Result<(LookStatistics, Looked)> {
+) -> Result<(LookStatistics, Looked, Option<RefineReport>)> {
     let parts = Parts { options: plan.options(), decibels, refine, gaussians: plan.len() };
     let observe = |renderer| parts.observe(renderer, bucket.splats(), progress);
-    let observed = renderer.map(observe).transpose()?;
-    Ok(bucket.look(plan, observed.map(|(observed, _)| observed))?)
+    let (observed, refined) = renderer.map(observe).transpose()?.unzip();
+    let (statistics, looked) = bucket.look(plan, observed)?;
+    Ok((statistics, looked, refined.flatten()))
 }
 
 /// Codes a bucket. If its sensitivity was not `guessed`, the file is fitted to pictures: base colours and opacities, and with

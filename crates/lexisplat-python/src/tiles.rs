@@ -10,7 +10,7 @@ use lexisplat::packed::tiles::{
 };
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Joined, Silent, SplatSource, Splats};
-use lexisplat_compress::{CompressionReport, Error, Quality, Refine, Target, tiles};
+use lexisplat_compress::{CompressionReport, Error, Quality, Refine, RefineReport, Target, tiles};
 use lexisplat_render::{Device, Renderer};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -165,14 +165,16 @@ impl From {
     }
 }
 
-/// Returns bytes for Python.
-fn made(py: Python<'_>, bytes: Vec<u8>) -> Py<PyBytes> {
+/// Bytes for Python.
+type Made = Py<PyBytes>;
+
+fn made(py: Python<'_>, bytes: Vec<u8>) -> Made {
     PyBytes::new(py, &bytes).unbind()
 }
 
 /// Reads all `messages`.
-fn all<T>(messages: &[PyBackedBytes], read: impl Fn(&[u8]) -> lexisplat::Result<T>) -> Result<Vec<T>> {
-    Ok(messages.iter().map(|message| read(message)).collect::<lexisplat::Result<_>>()?)
+fn all<T>(messages: &[impl AsRef<[u8]>], read: impl Fn(&[u8]) -> lexisplat::Result<T>) -> Result<Vec<T>> {
+    Ok(messages.iter().map(|message| read(message.as_ref())).collect::<lexisplat::Result<_>>()?)
 }
 
 /// Returns the number of Gaussians of a tile, and its warnings.
@@ -202,7 +204,7 @@ pub(crate) fn tile_survey(
     rows: (usize, usize),
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
-) -> PyResult<Py<PyBytes>> {
+) -> PyResult<Made> {
     let options = choices.reading(py, limit)?;
     let tile = Tile::of(tile)?;
     let seed = choices.seed;
@@ -298,8 +300,8 @@ pub(crate) fn tile_scatter(
     Ok(pieces.into_iter().map(|(bucket, piece)| (bucket, made(py, piece))).collect())
 }
 
-/// Measures the sensitivity of a bucket. Returns the statistics, the results for its Gaussians, and the name of the GPU
-/// that drew.
+/// Measures the sensitivity of a bucket. Returns the statistics, the results for its Gaussians, the name of the GPU that drew,
+/// and the result of refining as JSON.
 #[pyfunction]
 #[pyo3(signature = (plan, bucket, pieces, choices, limit))]
 pub(crate) fn tile_look(
@@ -309,28 +311,26 @@ pub(crate) fn tile_look(
     pieces: Pieces<'_>,
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
-) -> PyResult<(Py<PyBytes>, Py<PyBytes>, Option<String>)> {
+) -> PyResult<(Made, Made, Option<String>, Option<String>)> {
     let options = choices.reading(py, limit)?;
     let (from, device) = (From::of(pieces)?, device(py, &choices.device)?);
-    let (statistics, looked, gpu) = without_gil(py, None, move |watch| {
+    let (statistics, looked, gpu, refined) = without_gil(py, None, move |watch| {
         let plan = Plan::from_bytes(&plan)?;
         let bucket = from.bucket(&plan, bucket, &options)?;
         let mut renderer = choices.renderer(device)?;
         let (asked, refine) = (choices.decibels()?, choices.effort()?);
-        let (statistics, looked) = tiles::look(&plan, &bucket, renderer.as_mut(), asked, refine, watch)?;
+        let (statistics, looked, refined) =
+            tiles::look(&plan, &bucket, renderer.as_mut(), asked, refine, watch)?;
         let gpu = renderer.filter(Renderer::is_gpu).map(|renderer| renderer.name().to_owned());
-        Ok((statistics.to_bytes(), looked.to_bytes(), gpu))
+        Ok((statistics.to_bytes(), looked.to_bytes(), gpu, refined))
     })?;
-    Ok((made(py, statistics), made(py, looked), gpu))
+    let refined = refined.map(|refined| json(py, &refined)).transpose()?;
+    Ok((made(py, statistics), made(py, looked), gpu, refined))
 }
 
 /// Returns the steps of a scene.
 #[pyfunction]
-pub(crate) fn tile_steps(
-    py: Python<'_>,
-    plan: PyBackedBytes,
-    buckets: Vec<PyBackedBytes>,
-) -> PyResult<Py<PyBytes>> {
+pub(crate) fn tile_steps(py: Python<'_>, plan: PyBackedBytes, buckets: Vec<PyBackedBytes>) -> PyResult<Made> {
     let bytes = without_gil(py, None, move |_| {
         let statistics = all(&buckets, LookStatistics::from_bytes)?;
         Ok(Steps::new(&Plan::from_bytes(&plan)?, &statistics)?.to_bytes())
@@ -373,7 +373,7 @@ impl TileSample {
     }
 
     /// Returns sums over the sample.
-    fn statistics(&self, py: Python<'_>, steps: PyBackedBytes) -> PyResult<Py<PyBytes>> {
+    fn statistics(&self, py: Python<'_>, steps: PyBackedBytes) -> PyResult<Made> {
         let bytes = without_gil(py, None, |_| {
             Ok(self.sample.statistics(&self.plan, &Steps::from_bytes(&steps)?)?.to_bytes())
         })?;
@@ -388,7 +388,7 @@ pub(crate) fn tile_coding(
     plan: PyBackedBytes,
     steps: PyBackedBytes,
     groups: Vec<PyBackedBytes>,
-) -> PyResult<Py<PyBytes>> {
+) -> PyResult<Made> {
     let bytes = without_gil(py, None, move |watch| {
         let (plan, steps) = (Plan::from_bytes(&plan)?, Steps::from_bytes(&steps)?);
         let groups = all(&groups, SampleStatistics::from_bytes)?;
@@ -410,7 +410,7 @@ pub(crate) fn tile_code(
     looked: PyBackedBytes,
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
-) -> PyResult<(Py<PyBytes>, Py<PyBytes>)> {
+) -> PyResult<(Made, Made)> {
     let options = choices.reading(py, limit)?;
     let from = From::of(pieces)?;
     let (counts, coded) = without_gil(py, None, move |watch| {
@@ -425,7 +425,7 @@ pub(crate) fn tile_code(
 
 /// Returns the tables with which all buckets are coded.
 #[pyfunction]
-pub(crate) fn tile_tables(py: Python<'_>, counts: Vec<PyBackedBytes>) -> PyResult<Py<PyBytes>> {
+pub(crate) fn tile_tables(py: Python<'_>, counts: Vec<PyBackedBytes>) -> PyResult<Made> {
     let bytes =
         without_gil(py, None, move |_| Ok(Tables::new(&all(&counts, Counts::from_bytes)?)?.to_bytes()))?;
     Ok(made(py, bytes))
@@ -439,7 +439,7 @@ pub(crate) fn tile_finish(
     coding: PyBackedBytes,
     tables: PyBackedBytes,
     coded: PyBackedBytes,
-) -> PyResult<Py<PyBytes>> {
+) -> PyResult<Made> {
     let bytes = without_gil(py, None, move |_| {
         let (plan, coding) = (Plan::from_bytes(&plan)?, Coding::from_bytes(&coding)?);
         let tables = Tables::from_bytes(&tables)?;
@@ -448,9 +448,10 @@ pub(crate) fn tile_finish(
     Ok(made(py, bytes))
 }
 
-/// Writes file `file` of the coded buckets that `next` returns one after the other. Returns the report as JSON.
+/// Writes file `file` of the coded buckets that `next` returns one after the other. `refined` holds the results of refining that
+/// [`tile_look`] returned. Returns the report as JSON.
 #[pyfunction]
-#[pyo3(signature = (plan, coding, tables, file, next, counts, path, *, source_bytes, overwrite, guess, gpu))]
+#[pyo3(signature = (plan, coding, tables, file, next, counts, refined, path, *, source_bytes, overwrite, guess, gpu))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn tile_assemble(
     py: Python<'_>,
@@ -460,6 +461,7 @@ pub(crate) fn tile_assemble(
     file: usize,
     next: &Bound<'_, PyAny>,
     counts: Vec<PyBackedBytes>,
+    refined: Vec<String>,
     path: PathBuf,
     source_bytes: u64,
     overwrite: bool,
@@ -471,6 +473,11 @@ pub(crate) fn tile_assemble(
     let coding = Coding::from_bytes(&coding).map_err(fail)?;
     let tables = Tables::from_bytes(&tables).map_err(fail)?;
     let counts = all(&counts, Counts::from_bytes).map_err(|error| raise(py, &error))?;
+    let results = all(&refined, |text| {
+        serde_json::from_slice::<RefineReport>(text)
+            .map_err(|error| lexisplat::Error::parameter("refined", error, "results of refining"))
+    });
+    let results = results.map_err(|error| raise(py, &error))?;
     output(&path, overwrite).check().map_err(fail)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut assembly = Assembly::new(&plan, &coding, &tables, file, folder).map_err(fail)?;
@@ -483,6 +490,7 @@ pub(crate) fn tile_assemble(
     })?;
     let mut report = CompressionReport::in_parts(&done, guess);
     report.source_bytes = source_bytes;
+    report.refined = RefineReport::of_parts(results);
     json(py, &report)
 }
 
@@ -494,7 +502,7 @@ pub(crate) fn tile_whole(
     tiles: Vec<Named<'_>>,
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
-) -> PyResult<(Py<PyBytes>, String)> {
+) -> PyResult<(Made, String)> {
     let options = choices.reading(py, limit)?;
     let device = device(py, &choices.device)?;
     let given = tiles.into_iter().map(Tile::of).collect::<PyResult<Vec<_>>>()?;

@@ -160,6 +160,7 @@ def test_a_tile_has_the_quality_asked_for_and_is_refined(few: list[Path], tmp_pa
     for less in (coarse, refined):
         assert less["file_bytes"] < plain["file_bytes"]
         assert less["gaussians"] + less["removed"] == 500 and len(lx.open(less["output"]).decode()) == less["gaussians"]
+    assert plain["refined"] is None and refined["refined"]["gaussians"] >= refined["gaussians"]
 
 
 @pytest.fixture

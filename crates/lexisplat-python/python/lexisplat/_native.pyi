@@ -173,7 +173,7 @@ def tile_scatter(
 ) -> list[tuple[int, bytes]]: ...
 def tile_look(
     plan: bytes, bucket: int, pieces: _Pieces, choices: dict[str, Any], limit: _Limit
-) -> tuple[bytes, bytes, str | None]: ...
+) -> tuple[bytes, bytes, str | None, str | None]: ...
 def tile_steps(plan: bytes, buckets: list[bytes]) -> bytes: ...
 def tile_coding(plan: bytes, steps: bytes, groups: list[bytes]) -> bytes: ...
 def tile_code(
@@ -194,6 +194,7 @@ def tile_assemble(
     file: int,
     next: Iterator[bytes],
     counts: list[bytes],
+    refined: list[str],
     path: str | os.PathLike[str],
     *,
     source_bytes: int,

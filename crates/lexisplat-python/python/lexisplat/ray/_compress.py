@@ -212,12 +212,12 @@ class _Scene:
             work.start(tasks.look, self._plan, bucket, own, returns=2, **self._drawing)
             for bucket, own in enumerate(pieces)
         ]
-        found = work.results("look", [look[0] for look in looks])
+        seen: list[tasks.Look] = work.results("look", [look[0] for look in looks])
         looked = [look[1] for look in looks]
-        work.traffic["statistics"] += sum(len(own[0]) for own in found)
-        work.traffic["state"] += sum(own[1] for own in found)
-        gpu = next((own[2] for own in found if own[2] is not None), None)
-        steps = _native.tile_steps(plan, [own[0] for own in found])
+        work.traffic["statistics"] += sum(len(own.statistics) for own in seen)
+        work.traffic["state"] += sum(own.remembered for own in seen)
+        gpu = next((own.gpu for own in seen if own.gpu is not None), None)
+        steps = _native.tile_steps(plan, [own.statistics for own in seen])
         coding = self._learned(plan, steps, groups, pieces, looked)
         shared = work.shared(coding)
         codes = [
@@ -243,6 +243,7 @@ class _Scene:
                 number,
                 self._coded(ends, start, stop),
                 counts[start:stop],
+                [own.refined for own in seen[start:stop] if own.refined is not None],
                 path,
                 source_bytes=self._bytes[number] if self._one_each else sum(self._bytes),
                 overwrite=overwrite,

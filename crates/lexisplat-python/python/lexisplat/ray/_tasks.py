@@ -66,12 +66,24 @@ def scatter(context: Context, plan: bytes, number: int, tile: Tile, rows: Rows, 
     return pieces[0] if buckets == 1 else pieces
 
 
-def look(context: Context, plan: bytes, bucket: int, pieces: Pieces) -> tuple[tuple[bytes, int, str | None], bytes]:
-    """Statistics, the length of what is remembered, and the GPU that looked; what is remembered."""
+class Look(NamedTuple):
+    """What is known of a bucket that was looked at."""
+
+    statistics: bytes
+    #: Length of what is remembered.
+    remembered: int
+    #: The GPU that looked.
+    gpu: str | None
+    #: The result of refining, as JSON.
+    refined: str | None
+
+
+def look(context: Context, plan: bytes, bucket: int, pieces: Pieces) -> tuple[Look, bytes]:
+    """What is known of a bucket, and what is remembered."""
     context.begin()
     with quiet(context.choices["device"]):
-        statistics, looked, gpu = _native.tile_look(plan, bucket, _pieces(pieces), context.choices, context.limit)
-    return (statistics, len(looked), gpu), looked
+        statistics, looked, gpu, refined = _native.tile_look(plan, bucket, _pieces(pieces), context.choices, context.limit)
+    return Look(statistics, len(looked), gpu, refined), looked
 
 
 class Draw(NamedTuple):
