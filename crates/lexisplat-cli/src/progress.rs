@@ -44,22 +44,28 @@ struct Step {
     /// Number of units; 0 if it is not known.
     total: u64,
     done: u64,
+    /// The PSNR of pictures so far, in dB, if it is told.
+    quality: Option<f64>,
     start: Instant,
 }
 
 impl Step {
     fn new(label: &str, unit: &str, total: u64) -> Self {
         let label = format::escape(label).into_owned();
-        Self { label, unit: unit.to_owned(), total, done: 0, start: Instant::now() }
+        Self { label, unit: unit.to_owned(), total, done: 0, quality: None, start: Instant::now() }
     }
 
     /// Returns the work and how much of it is done, as text.
     fn text(&self) -> String {
         let (label, unit) = (&self.label, &self.unit);
         let done = format::count(self.done);
-        match self.total {
+        let text = match self.total {
             0 => format!("{label}, {done} {unit}"),
             total => format!("{label}, {done} of {} {unit}", format::count(total)),
+        };
+        match self.quality {
+            Some(decibels) => format!("{text}, {decibels:.1} dB"),
+            None => text,
         }
     }
 
@@ -230,6 +236,12 @@ impl Progress for Bars {
         }
     }
 
+    fn quality(&self, decibels: f64) {
+        if let Some(step) = lock(&WORK).step.as_mut() {
+            step.quality = Some(decibels);
+        }
+    }
+
     fn end(&self) {
         lock(&WORK).step = None;
     }
@@ -246,6 +258,8 @@ mod tests {
         bars.begin(Stage::Code, 90_000);
         bars.advance(1234);
         assert_eq!(text(), "coding, 1,234 of 90,000 Gaussians");
+        bars.quality(41.96);
+        assert_eq!(text(), "coding, 1,234 of 90,000 Gaussians, 42.0 dB");
         bars.begin(Stage::Read, 0);
         assert_eq!(text(), "reading, 0 bytes");
         bars.end();

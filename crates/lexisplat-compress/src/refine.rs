@@ -8,6 +8,7 @@ use lexisplat::{Progress, Sensitivity, Splats, Stage};
 use lexisplat_render::{Camera, Differentiator, GaussianGradient, Image, PictureGradient, Renderer, Scene};
 use rayon::prelude::*;
 
+use crate::decibels::decibels;
 use crate::drawing::{DrawOptions, draw_each};
 use crate::effort::{Refine, RefineSteps};
 use crate::error::Result;
@@ -171,6 +172,8 @@ impl Refining {
         let mut adam = Adam::new(splats);
         let sizes = Sizes::new(free, extent(&self.cameras));
         progress.begin(Stage::Refine, steps as u64);
+        // The squared error of a pixel, a mean over about one round of the views.
+        let mut error = 0.0;
         for step in 0..steps {
             progress.check()?;
             let view = order(step, self.cameras.len());
@@ -179,6 +182,10 @@ impl Refining {
             let target = Image::from_8bit(width, height, &self.targets[view])?;
             let gradient = differentiator.gradient(splats, camera, &target)?;
             adam.step(splats, &gradient, &sizes.after(step, steps), cost, shares);
+            error += (gradient.loss - error) / (step + 1).min(self.cameras.len()) as f64;
+            if let Some(decibels) = decibels(error, 1) {
+                progress.quality(decibels);
+            }
             progress.advance(1);
         }
         progress.end();
@@ -342,6 +349,7 @@ fn moved(value: &mut f32, [first, second]: [&mut f32; 2], derivative: f32, size:
 #[cfg(test)]
 mod tests {
     use std::collections::HashSet;
+    use std::sync::Mutex;
 
     use lexisplat::Silent;
     use lexisplat_render::orbit;
@@ -361,6 +369,16 @@ mod tests {
         (all, some, refining)
     }
 
+    /// The qualities that were told.
+    #[derive(Default)]
+    struct Told(Mutex<Vec<f64>>);
+
+    impl Progress for Told {
+        fn quality(&self, decibels: f64) {
+            self.0.lock().unwrap().push(decibels);
+        }
+    }
+
     #[test]
     fn views_come_once_a_round_in_changing_order() {
         for views in [1, 2, 7, 12] {
@@ -377,8 +395,10 @@ mod tests {
         let mut judge = Judge::new(Renderer::cpu(), &all, &views, true, &Silent).unwrap();
         let free = RestCost::new(std::iter::repeat_n(0.0, 200), 1.0);
         let mut fitted = [Free::All, Free::Radiance, Free::Appearance].map(|values| {
-            let mut splats = some.clone();
-            refining.refine(&mut splats, values, 160, &free, None, &Silent).unwrap();
+            let (mut splats, told) = (some.clone(), Told::default());
+            refining.refine(&mut splats, values, 160, &free, None, &told).unwrap();
+            let told = told.0.into_inner().unwrap();
+            assert!(told.len() == 160 && told[159] > told[7] + 1.0, "{told:?}");
             (judge.score(&splats, &Silent).unwrap().mean, splats)
         });
         let before = judge.score(&some, &Silent).unwrap().mean;

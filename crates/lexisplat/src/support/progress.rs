@@ -14,6 +14,11 @@ pub trait Progress: Sync {
         let _ = units;
     }
 
+    /// Is told the quality that the current stage has reached so far, as the PSNR of pictures in dB.
+    fn quality(&self, decibels: f64) {
+        let _ = decibels;
+    }
+
     /// Is told that the current stage is over.
     fn end(&self) {}
 
