@@ -36,6 +36,12 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
   };
   const heard = (name) => page.evaluate((name) => globalThis.heard.filter(([heard]) => heard === name).map(([, detail]) => detail), name);
   const loaded = (count = 1) => page.waitForFunction((count) => globalThis.heard.filter(([name]) => name === 'load').length === count, count);
+  // The first picture may be of a canvas that has not learnt its size yet.
+  const drawnInFull = () =>
+    page.waitForFunction(() => {
+      const canvas = document.querySelector('lexi-viewer').shadowRoot.querySelector('canvas');
+      return canvas.width === Math.round(canvas.clientWidth * devicePixelRatio) && canvas.ariaBusy === 'false';
+    });
   const viewers = () => page.evaluate(() => (globalThis.viewers ?? []).map(({ freed }) => freed));
   const test = faultless(() => page);
 
@@ -121,6 +127,7 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
       const { x, y, height } = await page.locator('.mark', { hasText: text }).boundingBox();
       return [x + 7, y + height / 2].map(Math.round);
     };
+    await drawnInFull();
     const box = await page.locator('lexi-viewer canvas').boundingBox();
     const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
     const near = ([a, b], [c, d]) => assert.ok(Math.abs(a - c) <= 2 && Math.abs(b - d) <= 2, `${a} ${b}, not ${c} ${d}`);
