@@ -102,7 +102,8 @@ impl<'a> PictureAdjoint<'a> {
         let sums = self.apply(
             #[inline(always)]
             |canvas, _, view, tile| errors(canvas, &targets[view], tile),
-            carried_with_squares::<N>,
+            #[inline(always)]
+            |canvas, trace, tile, light| carried_with_squares::<N>(canvas, trace, tile, light),
             progress,
         )?;
         let column = |k: usize| sums.iter().map(|sums| sums[k]).collect();
@@ -130,14 +131,15 @@ impl<'a> PictureAdjoint<'a> {
         }
         self.apply(
             #[inline(always)]
-            |canvas, trace, _, tile| changed(canvas, trace, tile, changes),
-            carried,
+            |_, trace, _, tile| changed(trace, tile, changes),
+            #[inline(always)]
+            |canvas, trace, tile, light| carried(canvas, trace, tile, light),
             progress,
         )
     }
 
     /// Applies `carry` to each tile of each view after the tile is drawn, with the values that `light` returns for its
-    /// pixels.
+    /// pixels. Both must be closures marked `#[inline(always)]`, since nothing else gets the vector instructions.
     fn apply<const N: usize, const M: usize>(
         &mut self,
         light: impl Fn(&Canvas, &Trace, usize, Tile) -> Light<M> + Sync,
@@ -224,30 +226,38 @@ pub(super) fn errors(picture: &Canvas, target: &Image, tile: Tile) -> Light<4> {
     light
 }
 
-/// Returns J times `changes` at each pixel of a finished tile.
+/// Returns J times `changes` at each pixel of a tile.
+///
+/// A change of a splat's opacity changes the weights of the splats behind it, all by the same factor. The logarithm of that
+/// factor is therefore carried from front to back.
 #[inline(always)]
-fn changed<const N: usize>(
-    picture: &Canvas,
-    trace: &Trace,
-    tile: Tile,
-    changes: &[GaussianChange<N>],
-) -> Light<3> {
+fn changed<const N: usize>(trace: &Trace, tile: Tile, changes: &[GaussianChange<N>]) -> Light<3> {
+    let [x, y] = tile.coordinates();
     let mut light = [[[[0.0; LANES]; 3]; BLOCKS]; BLOCKS];
-    each_mark::<N>(
-        picture,
+    // Changes of the logarithm of the light that reaches a splat.
+    let mut reaching = [[[0.0; LANES]; BLOCKS]; BLOCKS];
+    each_mark(
         trace,
         tile,
         #[inline(always)]
-        |splat, [column, row], Derivatives { weights, by_opacity, power_by_size }| {
+        |splat, [column, row], Shares { weights, odds }| {
             let change = &changes[splat.gaussian as usize];
-            let [opacity, size] = [3, 4].map(|k| if k < N { change[k] } else { 0.0 });
             let light = &mut light[column][row];
-            for (channel, &colour) in change.iter().take(3).enumerate() {
-                let inputs = [&light[channel], weights, &by_opacity[channel], power_by_size];
-                [light[channel]] = each(inputs, |[sum, weight, by_opacity, by_size]| {
+            let mut of_weight = [0.0; LANES];
+            if N >= WITH_OPACITY {
+                let power = power_by_size::<N>(splat, &x[column], &y[row]);
+                let [opacity, size] = [3, 4].map(|k| if k < N { change[k] } else { 0.0 });
+                let reaching = &mut reaching[column][row];
+                [of_weight, *reaching] = each([&*reaching, odds, &power], |[reaching, odds, by_size]| {
                     let of_alpha = if N == WITH_SIZE { opacity + by_size * size } else { opacity };
-                    let moved = if N < WITH_OPACITY { 0.0 } else { by_opacity * of_alpha };
-                    [sum + weight * colour + moved]
+                    [where_moves(of_alpha, odds) + reaching, reaching - odds * of_alpha]
+                });
+            }
+            for (channel, colour) in splat.colour.into_iter().enumerate() {
+                let inputs = [&light[channel], weights, &of_weight];
+                [light[channel]] = each(inputs, |[sum, weight, of_weight]| {
+                    let by_opacity = if N < WITH_OPACITY { 0.0 } else { colour * of_weight };
+                    [sum + weight * (change[channel] + by_opacity)]
                 });
             }
         },
@@ -263,12 +273,16 @@ fn carried<const N: usize>(
     tile: Tile,
     light: &Light<3>,
 ) -> Vec<(u32, GaussianChange<N>)> {
-    summed::<N, N>(
-        picture,
+    let [x, y] = tile.coordinates();
+    let mut behind = Behind::all(picture, light);
+    summed(
         trace,
         tile,
         #[inline(always)]
-        |_, sums, [column, row], derivatives| add_carried::<N, N, 3>(sums, derivatives, &light[column][row]),
+        |splat, sums: &mut [Lanes; N], block, shares| {
+            let power = power_by_size::<N>(splat, &x[block[0]], &y[block[1]]);
+            add_carried::<N, N, 3>(sums, splat, block, shares, &power, &mut behind, light);
+        },
     )
 }
 
@@ -286,19 +300,27 @@ fn carried_with_squares<const N: usize>(
     tile: Tile,
     light: &Light<4>,
 ) -> Vec<(u32, [f32; 8])> {
-    summed::<N, 8>(
-        picture,
+    let [x, y] = tile.coordinates();
+    let mut behind = Behind::all(picture, light);
+    // The light that splats behind add to each channel.
+    let mut channels: Light<3> = picture.blocks.map(|column| column.map(|block| block.colour));
+    summed(
         trace,
         tile,
         #[inline(always)]
-        |_, sums, [column, row], derivatives| {
-            let light = &light[column][row];
-            add_carried::<N, 8, 4>(sums, derivatives, light);
-            sums[ROW_SUM] = products_added(&sums[ROW_SUM], &derivatives.weights, &light[3]);
-            for by_opacity in &derivatives.by_opacity {
-                sums[OPACITY_SQUARES] = products_added(&sums[OPACITY_SQUARES], by_opacity, by_opacity);
+        |splat, sums: &mut [Lanes; 8], [column, row], shares| {
+            let power = power_by_size::<N>(splat, &x[column], &y[row]);
+            add_carried::<N, 8, 4>(sums, splat, [column, row], shares, &power, &mut behind, light);
+            sums[ROW_SUM] = products_added(&sums[ROW_SUM], &shares.weights, &light[column][row][3]);
+            for (behind, colour) in channels[column][row].iter_mut().zip(splat.colour) {
+                let of_channel = [&*behind, &shares.weights, &shares.odds];
+                let by_opacity;
+                [by_opacity, *behind] = each(of_channel, |[behind, weight, odds]| {
+                    by_opacity_and_behind(weight * colour, odds, behind)
+                });
+                sums[OPACITY_SQUARES] = products_added(&sums[OPACITY_SQUARES], &by_opacity, &by_opacity);
                 if N == WITH_SIZE {
-                    let [by_size] = each([by_opacity, &derivatives.power_by_size], |[a, b]| [a * b]);
+                    let [by_size] = each([&by_opacity, &power], |[a, b]| [a * b]);
                     sums[SIZE_SQUARES] = products_added(&sums[SIZE_SQUARES], &by_size, &by_size);
                 }
             }
@@ -310,17 +332,22 @@ fn carried_with_squares<const N: usize>(
 #[inline(always)]
 fn add_carried<const N: usize, const SUMS: usize, const M: usize>(
     sums: &mut [Lanes; SUMS],
-    Derivatives { weights, by_opacity, power_by_size }: &Derivatives,
-    light: &[Lanes; M],
+    splat: &Splat,
+    block: [usize; 2],
+    shares: &Shares,
+    power_by_size: &Lanes,
+    behind: &mut Behind,
+    light: &Light<M>,
 ) {
+    let own = &light[block[0]][block[1]];
     for channel in 0..3 {
-        sums[channel] = products_added(&sums[channel], weights, &light[channel]);
-        if N >= WITH_OPACITY {
-            let [by_alpha] = each([&by_opacity[channel], &light[channel]], |[a, b]| [a * b]);
-            [sums[3]] = each([&sums[3], &by_alpha], |[sum, v]| [sum + v]);
-            if N == WITH_SIZE {
-                sums[N - 1] = products_added(&sums[N - 1], &by_alpha, power_by_size);
-            }
+        sums[channel] = products_added(&sums[channel], &shares.weights, &own[channel]);
+    }
+    if N >= WITH_OPACITY {
+        let by_opacity = behind.pass(splat, block, shares, own);
+        [sums[3]] = each([&sums[3], &by_opacity], |[sum, v]| [sum + v]);
+        if N == WITH_SIZE {
+            sums[N - 1] = products_added(&sums[N - 1], &by_opacity, power_by_size);
         }
     }
 }
@@ -331,28 +358,85 @@ fn products_added(sums: &Lanes, a: &Lanes, b: &Lanes) -> Lanes {
     sums
 }
 
+/// For each pixel of a tile, the light that a splat and all splats behind it add, times a value of the pixel, summed over
+/// the channels.
+pub(super) struct Behind([[Lanes; BLOCKS]; BLOCKS]);
+
+impl Behind {
+    /// Returns the light of all splats of `picture` times the first three values of `light`.
+    #[inline(always)]
+    pub(super) fn all<const M: usize>(picture: &Canvas, light: &Light<M>) -> Self {
+        let mut all = [[[0.0; LANES]; BLOCKS]; BLOCKS];
+        for (all, (block, light)) in all
+            .as_flattened_mut()
+            .iter_mut()
+            .zip(picture.blocks.as_flattened().iter().zip(light.as_flattened()))
+        {
+            for (colour, light) in block.colour.iter().zip(light) {
+                *all = products_added(all, colour, light);
+            }
+        }
+        Self(all)
+    }
+
+    /// Passes `splat` in a block, from front to back. Returns the derivatives of the pixels by the logarithm of the
+    /// splat's opacity, times the first three values of `light`, summed over the channels.
+    #[inline(always)]
+    pub(super) fn pass<const M: usize>(
+        &mut self,
+        splat: &Splat,
+        block: [usize; 2],
+        Shares { weights, odds }: &Shares,
+        light: &[Lanes; M],
+    ) -> Lanes {
+        let [r, g, b] = splat.colour;
+        let behind = &mut self.0[block[0]][block[1]];
+        let inputs = [&*behind, weights, odds, &light[0], &light[1], &light[2]];
+        let by_opacity;
+        [by_opacity, *behind] = each(inputs, |[behind, weight, odds, red, green, blue]| {
+            by_opacity_and_behind(weight * (r * red + g * green + b * blue), odds, behind)
+        });
+        by_opacity
+    }
+}
+
+/// Returns the derivative of a pixel by the logarithm of a splat's opacity, and the light that the splats behind it add.
+/// `own` is the light that the splat adds, and `behind` the light of the splat and of those behind it.
+///
+/// A splat of opacity `a` adds its weight times its colour, and passes `1 - a` of the light on to the splats behind it.
+/// The derivative by the logarithm of `a` is therefore the splat's own light, less `a / (1 - a)` times the light behind it.
+#[inline(always)]
+fn by_opacity_and_behind(own: f32, odds: f32, behind: f32) -> [f32; 2] {
+    let behind = behind - own;
+    [where_moves(own, odds) - odds * behind, behind]
+}
+
+/// Returns `value` where `odds` are not 0, otherwise 0.
+#[inline(always)]
+fn where_moves(value: f32, odds: f32) -> f32 {
+    f32::from_bits(value.to_bits() & mask(odds > 0.0))
+}
+
 /// Returns sums over the pixels of each splat in `trace`, with the index of its Gaussian. `add` adds the sums of one
 /// block.
 #[inline(always)]
-pub(super) fn summed<const N: usize, const SUMS: usize>(
-    picture: &Canvas,
+pub(super) fn summed<const SUMS: usize>(
     trace: &Trace,
     tile: Tile,
-    mut add: impl FnMut(&Splat, &mut [Lanes; SUMS], [usize; 2], &Derivatives),
+    mut add: impl FnMut(&Splat, &mut [Lanes; SUMS], [usize; 2], &Shares),
 ) -> Vec<(u32, [f32; SUMS])> {
     let mut out: Vec<(u32, [f32; SUMS])> = Vec::with_capacity(trace.splats.len());
     let mut sums = [[0.0_f32; LANES]; SUMS];
     let mut last = None;
-    each_mark::<N>(
-        picture,
+    each_mark(
         trace,
         tile,
         #[inline(always)]
-        |splat, block, derivatives| {
+        |splat, block, shares| {
             if last != Some(splat.gaussian) {
                 out.extend(last.replace(splat.gaussian).map(|gaussian| (gaussian, take(&mut sums))));
             }
-            add(splat, &mut sums, block, derivatives);
+            add(splat, &mut sums, block, shares);
         },
     );
     out.extend(last.map(|gaussian| (gaussian, take(&mut sums))));
@@ -362,42 +446,38 @@ pub(super) fn summed<const N: usize, const SUMS: usize>(
 /// Returns the sums over lanes, and sets them to 0.
 #[inline(always)]
 fn take<const N: usize>(sums: &mut [Lanes; N]) -> [f32; N] {
-    std::mem::replace(sums, [[0.0; LANES]; N]).map(|lanes| lanes.iter().sum())
+    std::mem::replace(sums, [[0.0; LANES]; N]).map(
+        #[inline(always)]
+        |mut lanes| {
+            let mut half = LANES / 2;
+            while half > 0 {
+                (0..half).for_each(|lane| lanes[lane] += lanes[lane + half]);
+                half /= 2;
+            }
+            lanes[0]
+        },
+    )
 }
 
-/// Derivatives of the pixels of a block by the values of a splat.
-pub(super) struct Derivatives {
-    /// Derivatives of a colour channel by the same channel of the splat's colour.
+/// What a splat takes of the light in the pixels of a block. Both are 0 where the splat does not show.
+pub(super) struct Shares {
+    /// The share of all light that the splat takes: the derivatives of a colour channel by the same channel of the splat's
+    /// colour.
     pub(super) weights: Lanes,
-    /// Derivatives of the three channels by the logarithm of the splat's opacity.
-    pub(super) by_opacity: [Lanes; 3],
-    /// Derivatives of the logarithm of the splat's opacity in the pixel by the logarithms of its scales; 0 unless `N` is
-    /// [`WITH_SIZE`].
-    power_by_size: Lanes,
+    /// `a / (1 - a)` for the splat's opacity `a`: the share of the light behind that is lost if the logarithm of `a` grows
+    /// by 1. The odds are also 0 where the opacity is cut off at its largest value, because it does not grow there.
+    pub(super) odds: Lanes,
 }
 
 /// Calls `with` for each mark of `trace`, from front to back, with the splat and the column and row of the block.
-///
-/// A splat of opacity `a` adds its weight times its colour, and passes `1 - a` of the light on to the splats behind it.
-/// The derivative by the logarithm of `a` is therefore the weight times the colour, less `a / (1 - a)` times the light
-/// that the splats behind it add. The derivative is 0 where the opacity is cut off at its largest value.
 #[inline(always)]
-fn each_mark<const N: usize>(
-    picture: &Canvas,
-    trace: &Trace,
-    tile: Tile,
-    mut with: impl FnMut(&Splat, [usize; 2], &Derivatives),
-) {
-    const { assert!(3 <= N && N <= WITH_SIZE) };
-    let [x, y] = tile.coordinates();
+fn each_mark(trace: &Trace, tile: Tile, mut with: impl FnMut(&Splat, [usize; 2], &Shares)) {
     let mut open: [[Lanes; BLOCKS]; BLOCKS] =
         std::array::from_fn(|column| std::array::from_fn(|row| tile.inside(column, row)));
-    // The light added by a splat and all splats behind it.
-    let mut behind: Light<3> = picture.blocks.map(|column| column.map(|block| block.colour));
     for mark in &trace.marks {
         let splat = &trace.splats[mark.splat as usize];
         let block = mark.block.map(|k| usize::from(k) % BLOCKS);
-        let (open, behind) = (&mut open[block[0]][block[1]], &mut behind[block[0]][block[1]]);
+        let open = &mut open[block[0]][block[1]];
         let [weights, odds, left] = each([&mark.alpha, open], |[alpha, open]| {
             let left = open * (1.0 - alpha);
             let shows = mask(left >= TRANSMITTANCE_MIN);
@@ -407,30 +487,18 @@ fn each_mark<const N: usize>(
                 .map(|(v, mask)| f32::from_bits(v.to_bits() & mask))
         });
         *open = left;
-        let mut by_opacity = [[0.0_f32; LANES]; 3];
-        for (channel, colour) in splat.colour.into_iter().enumerate() {
-            [behind[channel], by_opacity[channel]] =
-                each([&behind[channel], &weights, &odds], |[behind, weight, odds]| {
-                    let own = weight * colour;
-                    let behind = behind - own;
-                    // The odds are 0 where the opacity is cut off, or where there is no weight.
-                    let moved = f32::from_bits(own.to_bits() & mask(odds > 0.0));
-                    [behind, moved - odds * behind]
-                });
-        }
-        let power_by_size = match N {
-            WITH_SIZE => power_by_size(splat, &x[block[0]], &y[block[1]]),
-            _ => [0.0; LANES],
-        };
-        with(splat, block, &Derivatives { weights, by_opacity, power_by_size });
+        with(splat, block, &Shares { weights, odds });
     }
 }
 
 /// Returns the derivatives of a splat's power at pixels by the logarithms of its three scales, which change alike:
 /// `d^T C d - dilation * |C d|^2`, with the conic C and the distance d from the centre. The second term is there because
-/// the dilation in the covariance does not grow.
+/// the dilation in the covariance does not grow. Returns 0 unless `N` is [`WITH_SIZE`].
 #[inline(always)]
-fn power_by_size(splat: &Splat, x: &Lanes, y: &Lanes) -> Lanes {
+fn power_by_size<const N: usize>(splat: &Splat, x: &Lanes, y: &Lanes) -> Lanes {
+    if N != WITH_SIZE {
+        return [0.0; LANES];
+    }
     let [a, b, c] = splat.conic;
     let [power] = each([x, y], |[x, y]| {
         let (dx, dy) = (splat.centre[0] - x, splat.centre[1] - y);

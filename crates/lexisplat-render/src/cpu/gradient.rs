@@ -10,7 +10,7 @@ use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
-use super::adjoint::{Derivatives, Light, errors, summed};
+use super::adjoint::{Behind, Light, Shares, errors, summed};
 use super::blend::Tile;
 use super::lanes::{LANES, Lanes, each};
 use super::measured_tiles::{Pool, Scratch, measure_tiles};
@@ -99,13 +99,16 @@ impl Differentiator {
                         canvas.draw_over(splats, list, tile, projection.background(), trace);
                         let light = errors(canvas, target, tile);
                         let [x, y] = tile.coordinates();
-                        let mut found = summed::<4, SUMS>(
-                            canvas,
+                        let mut behind = Behind::all(canvas, &light);
+                        let mut found = summed(
                             trace,
                             tile,
                             #[inline(always)]
-                            |splat, sums, [column, row], derivatives| {
-                                add(splat, sums, [&x[column], &y[row]], derivatives, &light[column][row]);
+                            |splat, sums, block, shares| {
+                                let [column, row] = block;
+                                let light = &light[column][row];
+                                let by_opacity = behind.pass(splat, block, shares, light);
+                                add(splat, sums, [&x[column], &y[row]], shares, &by_opacity, light);
                             },
                         );
                         let mut own = [0.0; SUMS];
@@ -164,28 +167,26 @@ fn squares(light: &Light<4>) -> f32 {
     sums.iter().sum()
 }
 
-/// Adds the products of one block's derivatives with its errors to the sums of `splat`.
+/// Adds the products of one block's derivatives with its errors to the sums of `splat`. `g` are the products of the
+/// derivatives by the logarithm of the opacity.
 #[inline(always)]
 fn add(
     splat: &Splat,
     sums: &mut [Lanes; SUMS],
     [x, y]: [&Lanes; 2],
-    Derivatives { weights, by_opacity, .. }: &Derivatives,
+    Shares { weights, .. }: &Shares,
+    g: &Lanes,
     light: &[Lanes; 4],
 ) {
     for channel in 0..3 {
         let inputs = [&sums[channel], weights, &light[channel]];
         [sums[channel]] = each(inputs, |[sum, weight, light]| [sum + weight * light]);
     }
-    let [red, green, blue] = by_opacity;
-    let [g] = each([red, green, blue, &light[0], &light[1], &light[2]], |[r, g, b, red, green, blue]| {
-        [r * red + g * green + b * blue]
-    });
     let [px, py] = splat.centre;
-    let [gx, gy] = each([&g, x, y], |[g, x, y]| [g * (px - x), g * (py - y)]);
+    let [gx, gy] = each([g, x, y], |[g, x, y]| [g * (px - x), g * (py - y)]);
     let [gxx, gxy, gyy] =
         each([&gx, &gy, x, y], |[gx, gy, x, y]| [gx * (px - x), gx * (py - y), gy * (py - y)]);
-    for (sum, own) in sums[OF_OPACITY..].iter_mut().zip([&g, &gx, &gy, &gxx, &gxy, &gyy]) {
+    for (sum, own) in sums[OF_OPACITY..].iter_mut().zip([g, &gx, &gy, &gxx, &gxy, &gyy]) {
         [*sum] = each([&*sum, own], |[sum, own]| [sum + own]);
     }
 }
