@@ -3,7 +3,8 @@
 //! Fewer Gaussians then show what all of them showed. The steps are those of Adam (Kingma and Ba, "Adam: a method for
 //! stochastic optimization", 2015), one view a step. A Gaussian moves only in steps whose view shows it (docs/METHOD.md, "Refining").
 
-use lexisplat::sh::{C0, rest_basis};
+use lexisplat::sh::{C0, MAX_REST, rest_basis};
+use lexisplat::simd::Simd;
 use lexisplat::{Progress, Sensitivity, Splats, Stage};
 use lexisplat_render::{Camera, Differentiator, GaussianGradient, Image, PictureGradient, Renderer, Scene};
 use rayon::prelude::*;
@@ -289,6 +290,7 @@ impl Adam {
             self.rows[i as usize] = k;
         }
         let (width, degree, all_steps) = (self.width, splats.degree, self.steps);
+        let (simd, per_channel) = (Simd::current(), degree.rest_per_channel().max(1));
         let own = self.all.par_chunks_exact_mut(1 + 3 * width).zip(&self.rows);
         own.enumerate().for_each(|(i, (own, &row))| {
             let Some(row) = rows.get(row as usize) else { return };
@@ -306,19 +308,25 @@ impl Adam {
                 moved(&mut values[k], [&mut first[k], &mut second[k]], derivative, size, bias);
             }
             if sizes.rest > 0.0 {
-                let per_channel = degree.rest_per_channel();
                 let basis = rest_basis(degree, *direction);
+                let mut data = [0.0; MAX_REST];
+                for (data, by_colour) in data.chunks_exact_mut(per_channel).zip(colour) {
+                    data.iter_mut().zip(&basis).for_each(|(data, basis)| *data = by_colour * basis);
+                }
                 let length = values[PLAIN..].iter().map(|v| v * v).sum::<f32>().sqrt();
                 // The cost counts in every step, and the Gaussian moves only in those that show it.
                 let slope = cost.slope(i, length) * all_steps / steps[0];
-                let data = colour
-                    .iter()
-                    .flat_map(|by_colour| basis.iter().take(per_channel).map(move |b| by_colour * b));
-                for (k, data) in (PLAIN..).zip(data) {
-                    let derivative = data + slope * values[k];
-                    let size = shares[PLAIN] * sizes.rest;
-                    moved(&mut values[k], [&mut first[k], &mut second[k]], derivative, size, bias);
-                }
+                let size = shares[PLAIN] * sizes.rest;
+                let [values, first, second] = [values, first, second].map(|all| &mut all[PLAIN..]);
+                simd.dispatch(
+                    #[inline(always)]
+                    || {
+                        let averages = first.iter_mut().zip(second);
+                        for ((value, data), (first, second)) in values.iter_mut().zip(&data).zip(averages) {
+                            moved(value, [first, second], data + slope * *value, size, bias);
+                        }
+                    },
+                );
             }
         });
         let rest = degree.rest();

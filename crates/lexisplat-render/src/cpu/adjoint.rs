@@ -102,6 +102,7 @@ impl<'a> PictureAdjoint<'a> {
         let sums = self.apply(
             #[inline(always)]
             |canvas, _, view, tile| errors(canvas, &targets[view], tile),
+            #[expect(clippy::redundant_closure, reason = "a function item would not be inlined")]
             #[inline(always)]
             |canvas, trace, tile, light| carried_with_squares::<N>(canvas, trace, tile, light),
             progress,
@@ -129,9 +130,11 @@ impl<'a> PictureAdjoint<'a> {
         if changes.len() != self.scene.len() {
             return Err(Error::parameter("changes", changes.len(), "one for each Gaussian"));
         }
+        let cameras = self.cameras;
         self.apply(
             #[inline(always)]
-            |_, trace, _, tile| changed(trace, tile, changes),
+            |canvas, trace, view, tile| changed(canvas, trace, cameras[view].background, tile, changes),
+            #[expect(clippy::redundant_closure, reason = "a function item would not be inlined")]
             #[inline(always)]
             |canvas, trace, tile, light| carried(canvas, trace, tile, light),
             progress,
@@ -226,12 +229,18 @@ pub(super) fn errors(picture: &Canvas, target: &Image, tile: Tile) -> Light<4> {
     light
 }
 
-/// Returns J times `changes` at each pixel of a tile.
+/// Returns J times `changes` at each pixel of a finished tile.
 ///
-/// A change of a splat's opacity changes the weights of the splats behind it, all by the same factor. The logarithm of that
-/// factor is therefore carried from front to back.
+/// A change of a splat's opacity changes the weights of the splats behind it and of the background, all by the same factor.
+/// The logarithm of that factor is therefore carried from front to back.
 #[inline(always)]
-fn changed<const N: usize>(trace: &Trace, tile: Tile, changes: &[GaussianChange<N>]) -> Light<3> {
+fn changed<const N: usize>(
+    picture: &Canvas,
+    trace: &Trace,
+    background: Option<[f32; 3]>,
+    tile: Tile,
+    changes: &[GaussianChange<N>],
+) -> Light<3> {
     let [x, y] = tile.coordinates();
     let mut light = [[[[0.0; LANES]; 3]; BLOCKS]; BLOCKS];
     // Changes of the logarithm of the light that reaches a splat.
@@ -262,6 +271,13 @@ fn changed<const N: usize>(trace: &Trace, tile: Tile, changes: &[GaussianChange<
             }
         },
     );
+    let blocks = picture.blocks.as_flattened().iter().zip(reaching.as_flattened());
+    for ((block, reaching), light) in blocks.zip(light.as_flattened_mut()) {
+        for (light, behind) in light.iter_mut().zip(background.into_iter().flatten()) {
+            let inputs = [&*light, &block.transmittance, reaching];
+            [*light] = each(inputs, |[sum, share, of_weight]| [sum + share * behind * of_weight]);
+        }
+    }
     light
 }
 

@@ -4,7 +4,7 @@ use lexisplat::simd::Simd;
 
 use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
 
-use super::lanes::{LANES, Lanes, each};
+use super::lanes::{LANES, Lanes};
 use super::math::{exp_in_range, mask};
 use super::splat::Splat;
 use super::trace::Trace;
@@ -28,7 +28,7 @@ pub(super) struct Block {
     /// picture.
     pub(super) open: Lanes,
     /// Share of light that the background adds. It stays 1 if the background is black.
-    transmittance: Lanes,
+    pub(super) transmittance: Lanes,
 }
 
 impl Block {
@@ -86,23 +86,70 @@ impl Tile {
         })
     }
 
-    /// Returns the blocks that a splat may touch, from `first` to before `end`, as (column, row).
+    /// Returns the blocks that a splat may touch.
     #[inline(always)]
-    fn reach(self, splat: &Splat) -> [[usize; 2]; 2] {
+    fn reach(self, splat: &Splat) -> BlockSet {
         let within = |pixel: u16, k: usize| usize::from(pixel).saturating_sub(self.corner[k]).min(TILE);
-        let first = std::array::from_fn(|k| within(splat.pixels.min[k], k) / SIDE);
-        let end = std::array::from_fn(|k| within(splat.pixels.max[k], k).div_ceil(SIDE));
-        [first, end]
+        let [first, end]: [[usize; 2]; 2] = [
+            std::array::from_fn(|k| within(splat.pixels.min[k], k) / SIDE),
+            std::array::from_fn(|k| within(splat.pixels.max[k], k).div_ceil(SIDE)),
+        ];
+        BlockSet::between(first, end)
     }
 }
+
+/// A set of blocks of a tile: bit `BLOCKS * column + row` for each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct BlockSet(u32);
+
+impl BlockSet {
+    const NONE: Self = Self(0);
+
+    /// Returns the blocks from `first` to before `end`, as (column, row).
+    #[inline(always)]
+    fn between(first: [usize; 2], end: [usize; 2]) -> Self {
+        // A bit for each row, and the lowest bit of each column.
+        let below = |end: usize, step: usize| (1_u32 << (end * step)) - 1;
+        let rows = below(end[1], 1) & !below(first[1], 1);
+        let columns = COLUMNS & below(end[0], BLOCKS) & !below(first[0], BLOCKS);
+        Self(rows * columns)
+    }
+
+    /// Includes a block if `is_in`, and otherwise excludes it.
+    #[inline(always)]
+    fn set(&mut self, column: usize, row: usize, is_in: bool) {
+        let bit = BLOCKS * column + row;
+        self.0 = self.0 & !(1 << bit) | u32::from(is_in) << bit;
+    }
+
+    #[inline(always)]
+    fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    /// Removes the first block, column by column, and returns its column and row.
+    #[inline(always)]
+    fn pop(&mut self) -> Option<[usize; 2]> {
+        if self.0 == 0 {
+            return None;
+        }
+        let bit = self.0.trailing_zeros() as usize;
+        self.0 &= self.0 - 1;
+        Some([bit / BLOCKS % BLOCKS, bit % BLOCKS])
+    }
+}
+
+/// The first block of each column.
+const COLUMNS: u32 = 0x1111;
+const _: () = assert!(BLOCKS == 4);
 
 /// A tile that is being drawn. The next tile overwrites it.
 #[derive(Debug)]
 pub(super) struct Canvas {
     /// The blocks, column by column.
     pub(super) blocks: [[Block; BLOCKS]; BLOCKS],
-    /// Whether each block has a pixel that is not finished.
-    open: [[bool; BLOCKS]; BLOCKS],
+    /// The blocks with a pixel that is not finished.
+    open: BlockSet,
     queue: Queue,
 }
 
@@ -133,7 +180,7 @@ impl Default for Canvas {
             blocks: [[0; 3]; QUEUED],
             lanes: [[0.0; LANES]; QUEUED],
         };
-        Self { blocks: [[Block::EMPTY; BLOCKS]; BLOCKS], open: [[true; BLOCKS]; BLOCKS], queue }
+        Self { blocks: [[Block::EMPTY; BLOCKS]; BLOCKS], open: BlockSet::NONE, queue }
     }
 }
 
@@ -147,24 +194,19 @@ impl Queue {
         slots: &[u32],
         tile: Tile,
         [x, y]: &[[Lanes; BLOCKS]; 2],
-        open: &[[bool; BLOCKS]; BLOCKS],
+        open: BlockSet,
     ) {
         for (to, slot) in self.splats.iter_mut().zip(slots) {
             *to = splats[*slot as usize];
         }
         self.len = 0;
         for (k, splat) in self.splats.iter().enumerate().take(slots.len()) {
-            let [first, end] = tile.reach(splat);
-            for column in first[0]..end[0] {
-                let across = Across::of(splat, &x[column]);
-                for row in first[1]..end[1] {
-                    if open[column][row] {
-                        let at = self.len % QUEUED;
-                        self.blocks[at] = [k as u8, column as u8, row as u8];
-                        let any = across.powers(&mut self.lanes[at], splat, &y[row]);
-                        self.len += usize::from(any);
-                    }
-                }
+            let mut reached = tile.reach(splat).and(open);
+            while let Some([column, row]) = reached.pop() {
+                let at = self.len % QUEUED;
+                self.blocks[at] = [k as u8, column as u8, row as u8];
+                let any = powers(&mut self.lanes[at], splat, &x[column], &y[row]);
+                self.len += usize::from(any);
             }
         }
     }
@@ -254,15 +296,15 @@ impl Canvas {
     ) {
         let Self { blocks, open, queue } = self;
         let coordinates = tile.coordinates();
-        for column in 0..BLOCKS {
-            for row in 0..BLOCKS {
+        for (column, blocks) in blocks.iter_mut().enumerate() {
+            for (row, block) in blocks.iter_mut().enumerate() {
                 let inside = tile.inside(column, row);
-                open[column][row] = inside != [0.0; LANES];
-                blocks[column][row] = Block { open: inside, ..Block::EMPTY };
+                open.set(column, row, inside != [0.0; LANES]);
+                *block = Block { open: inside, ..Block::EMPTY };
             }
         }
         for slots in list.flat_map(|piece| piece.chunks(FETCHED)) {
-            queue.fill(splats, slots, tile, &coordinates, open);
+            queue.fill(splats, slots, tile, &coordinates, *open);
             for at in 0..queue.len {
                 let opacity = queue.block(at).0.opacity;
                 alphas(&mut queue.lanes[at % QUEUED], opacity);
@@ -276,10 +318,10 @@ impl Canvas {
                     let [_, column, row] = queue.blocks[at % QUEUED];
                     watch.counts(splat, [column, row], alpha);
                 }
-                open[column][row] = !finished;
+                open.set(column, row, !finished);
                 any_finished |= finished;
             }
-            if any_finished && *open == [[false; BLOCKS]; BLOCKS] {
+            if any_finished && *open == BlockSet::NONE {
                 break;
             }
         }
@@ -316,39 +358,20 @@ fn blend<const BACKGROUND: bool>(block: &mut Block, splat: &Splat, alpha: &Lanes
     (changed != 0, still_open == 0)
 }
 
-/// The terms of a splat's exponents that all blocks of a column share.
-struct Across {
-    /// The xx of the conic times the squared distance in x.
-    squared: Lanes,
-    /// The xy of the conic times the distance in x.
-    product: Lanes,
-}
-
-impl Across {
-    #[inline(always)]
-    fn of(splat: &Splat, x: &Lanes) -> Self {
-        let [a, b, _] = splat.conic;
-        let [squared, product] = each([x], |[x]| {
-            let dx = splat.centre[0] - x;
-            [a * dx * dx, b * dx]
-        });
-        Self { squared, product }
+/// Writes the exponents of a splat's opacities at the pixels of a block. Exponents that cannot count become the cutoff,
+/// which cannot count either. Returns whether any exponent may count.
+#[inline(always)]
+fn powers(powers: &mut Lanes, splat: &Splat, x: &Lanes, y: &Lanes) -> bool {
+    let Splat { conic: [a, b, c], cutoff, .. } = *splat;
+    let mut any = 0;
+    for lane in 0..LANES {
+        let dx = splat.centre[0] - x[lane];
+        let dy = splat.centre[1] - y[lane];
+        let p = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
+        powers[lane] = if p > cutoff { p } else { cutoff };
+        any |= mask(p > cutoff);
     }
-
-    /// Writes the exponents of the splat's opacities at the pixels of a block. Exponents that cannot count become the
-    /// cutoff, which cannot count either. Returns whether any exponent may count.
-    #[inline(always)]
-    fn powers(&self, powers: &mut Lanes, splat: &Splat, y: &Lanes) -> bool {
-        let Splat { conic: [_, _, c], cutoff, .. } = *splat;
-        let mut any = 0;
-        for lane in 0..LANES {
-            let dy = splat.centre[1] - y[lane];
-            let p = -0.5 * (self.squared[lane] + c * dy * dy) - self.product[lane] * dy;
-            powers[lane] = if p > cutoff { p } else { cutoff };
-            any |= mask(p > cutoff);
-        }
-        any != 0
-    }
+    any != 0
 }
 
 /// Replaces the exponents of a block's pixels by the opacities of the splat there, or by 0 where the splat does not
