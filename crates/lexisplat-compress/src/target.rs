@@ -12,6 +12,8 @@ use crate::refit::{Refitted, Refitting};
 
 /// Largest amount by which a quality may exceed the target, in dB.
 const CLOSE_DB: f64 = 0.1;
+/// The same of a refined file, of which each try takes minutes.
+const REFINED_CLOSE_DB: f64 = 0.2;
 /// Largest share by which a size may fall short of the target.
 const CLOSE_SIZE: f64 = 0.01;
 /// Largest expected miss of a preset's first file, in dB, for which the file is refitted at its own step. After a larger
@@ -271,6 +273,7 @@ impl Search {
             true if asked > FINE_BYTES * gaussians => -libm::log2(1.0 - CLOSE_FINE_SIZE),
             true => -libm::log2(1.0 - CLOSE_SIZE),
             false if asked > FINE_DB => CLOSE_FINE_DB,
+            false if packer.refines() => REFINED_CLOSE_DB,
             false => CLOSE_DB,
         };
         let slope = if is_size { libm::log2(BYTES_PER_HALVING) } else { -DB_PER_HALVING };
