@@ -77,7 +77,8 @@ impl Removal<'_> {
         // The fall by the last removal. That by the first is not known, because the quality before it has no number.
         let mut fall = None;
         while splats.len() > 1 {
-            if let Some(next) = fall.map(|fall: f64| NEXT_FALL * fall).filter(|next| before - next < decibels) {
+            if let Some(next) = fall.map(|fall: f64| NEXT_FALL * fall).filter(|next| before - next < decibels)
+            {
                 return self.at_most(after_share(&splats, (before - decibels) / next), &splats, sensitivity);
             }
             let fewer = self.at_most(after_share(&splats, 1.0), &splats, sensitivity.clone())?;
