@@ -391,6 +391,24 @@ mod tests {
     use super::super::splat::PixelRect;
     use super::*;
 
+    #[test]
+    fn sets_of_blocks_are_rectangles_column_by_column() {
+        let places = || (0..=BLOCKS).flat_map(|column| (0..=BLOCKS).map(move |row| [column, row]));
+        for (first, end) in places().flat_map(|first| places().map(move |end| (first, end))) {
+            let mut set = BlockSet::between(first, end);
+            let found: Vec<[usize; 2]> = std::iter::from_fn(|| set.pop()).collect();
+            let within = |k: usize, place: &[usize; 2]| (first[k]..end[k]).contains(&place[k]);
+            let expected: Vec<[usize; 2]> =
+                places().filter(|place| within(0, place) && within(1, place)).collect();
+            assert_eq!(found, expected, "{first:?} {end:?}");
+        }
+        let mut set = BlockSet::between([0, 0], [BLOCKS; 2]);
+        set.set(2, 1, false);
+        assert_eq!(set.and(BlockSet::between([2, 0], [3, BLOCKS])).0.count_ones(), 3);
+        set.set(2, 1, true);
+        assert_eq!(set, BlockSet::between([0, 0], [BLOCKS; 2]));
+    }
+
     /// The vector instructions that this machine has round as the plain ones do.
     #[test]
     fn the_instruction_set_makes_no_difference() {
