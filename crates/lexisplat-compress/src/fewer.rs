@@ -72,11 +72,11 @@ impl Removal<'_> {
         sensitivity: Sensitivity,
         quality: &mut dyn FnMut(&Splats) -> Result<f64>,
     ) -> Result<(Splats, Sensitivity)> {
-        let all = splats.len();
-        let (mut splats, mut sensitivity, mut before) = (splats.clone(), sensitivity, FIRST_DB);
-        // The fall by the last removal. That by the first is not known, because the quality before it has no number.
-        let mut fall = None;
+        let (mut splats, mut sensitivity) = (splats.clone(), sensitivity);
+        // The quality after the last removal, and its fall by that removal. The fall by the first removal is not known.
+        let (mut last, mut fall) = (None, None);
         while splats.len() > 1 {
+            let before = last.unwrap_or(FIRST_DB);
             if let Some(next) = fall.map(|fall: f64| NEXT_FALL * fall).filter(|next| before - next < decibels)
             {
                 return self.at_most(after_share(&splats, (before - decibels) / next), &splats, sensitivity);
@@ -87,8 +87,8 @@ impl Removal<'_> {
                 let share = (before - decibels) / (before - after);
                 return self.at_most(after_share(&splats, share), &splats, sensitivity);
             }
-            fall = (splats.len() < all).then_some(before - after);
-            (splats, sensitivity, before) = (fewer.0, fewer.1, after);
+            fall = last.map(|before| before - after);
+            (splats, sensitivity, last) = (fewer.0, fewer.1, Some(after));
         }
         Ok((splats, sensitivity))
     }

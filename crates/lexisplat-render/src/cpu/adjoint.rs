@@ -475,7 +475,7 @@ fn take<const N: usize>(sums: &mut [Lanes; N]) -> [f32; N] {
     )
 }
 
-/// What a splat takes of the light in the pixels of a block. Both are 0 where the splat does not show.
+/// Shares of light that a splat takes in the pixels of a block. Both are 0 where the splat does not show.
 pub(super) struct Shares {
     /// The share of all light that the splat takes: the derivatives of a colour channel by the same channel of the splat's
     /// colour.

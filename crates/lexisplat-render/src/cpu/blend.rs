@@ -90,10 +90,8 @@ impl Tile {
     #[inline(always)]
     fn reach(self, splat: &Splat) -> BlockSet {
         let within = |pixel: u16, k: usize| usize::from(pixel).saturating_sub(self.corner[k]).min(TILE);
-        let [first, end]: [[usize; 2]; 2] = [
-            std::array::from_fn(|k| within(splat.pixels.min[k], k) / SIDE),
-            std::array::from_fn(|k| within(splat.pixels.max[k], k).div_ceil(SIDE)),
-        ];
+        let first = std::array::from_fn(|k| within(splat.pixels.min[k], k) / SIDE);
+        let end = std::array::from_fn(|k| within(splat.pixels.max[k], k).div_ceil(SIDE));
         BlockSet::between(first, end)
     }
 }
