@@ -258,6 +258,23 @@ fn the_allowance_is_kept() {
 }
 
 #[test]
+fn the_missing_part_of_a_range_takes_no_more_room() {
+    let file = file();
+    let outline = outline(file);
+    let [first, second] = [0, 1].map(|r| outline.ranges[r].bytes.clone());
+    let most = second.end;
+    let mut feed = feed(&FeedOptions::default().with_most_bytes(most));
+    feed.feed(0, &file[..index(first.start)]).unwrap();
+    let middle = second.start.midpoint(second.end);
+    give(&mut feed, file, middle..second.end).unwrap();
+    assert_eq!(feed.held_bytes(), most - (first.end - first.start));
+    // One run, of the first range and of the first half of the second, is longer than the room that is left.
+    assert_eq!(feed.wants(), Some(first.start..middle));
+    give(&mut feed, file, first.start..middle).unwrap();
+    assert_eq!((feed.wants(), feed.held_bytes()), (None, most));
+}
+
+#[test]
 fn chunks_are_chosen_and_ordered_by_where_they_are() {
     let (file, outline) = (file(), outline(file()));
     let last = outline.chunks.len() - 1;
