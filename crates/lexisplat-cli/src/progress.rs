@@ -28,12 +28,13 @@ const EMPTY: &str = "░";
 const LEAST_TIMED: Duration = Duration::from_millis(500);
 
 /// The current work of the command.
-static WORK: Mutex<Work> = Mutex::new(Work { outer: None, step: None });
-/// The current work of a command: a step, which may be part of larger work with several parts.
+static WORK: Mutex<Work> = Mutex::new(Work { outer: None, steps: Vec::new() });
+/// The current work of a command: steps within one another, which may be part of larger work with several parts.
 #[derive(Debug)]
 struct Work {
     outer: Option<Step>,
-    step: Option<Step>,
+    /// The current steps. Each is a part of the one before.
+    steps: Vec<Step>,
 }
 
 /// Work that is counted.
@@ -85,28 +86,28 @@ impl Step {
 }
 
 impl Work {
+    /// Returns all current work, the largest first.
+    fn all(&self) -> impl Iterator<Item = &Step> {
+        self.outer.iter().chain(&self.steps)
+    }
+
     /// Returns the work and how much of it is done, as text.
     fn text(&self) -> String {
-        let steps: Vec<String> = self.outer.iter().chain(&self.step).map(Step::text).collect();
+        let steps: Vec<String> = self.all().map(Step::text).collect();
         if steps.is_empty() { "working".to_owned() } else { steps.join("; ") }
     }
 
     /// Returns the line on a terminal at the time `now`, for a command that started at `start`: a bar, the work that is
     /// done, and the time left.
     fn line(&self, start: Instant, now: Instant) -> String {
-        let main = self.outer.as_ref().or(self.step.as_ref());
         let since = |from: Instant| now.saturating_duration_since(from);
-        let steps = self.outer.iter().chain(&self.step);
-        let left = steps.filter_map(|step| step.left(since(step.start))).next();
+        let left = self.all().find_map(|step| step.left(since(step.start)));
         let left = match left {
             Some(left) => format!("about {} left", seconds(left)),
             None => "time left not known yet".to_owned(),
         };
-        let whole = match (&self.outer, &self.step) {
-            (None, Some(_)) => " of this step",
-            _ => "",
-        };
-        let bar = main.and_then(Step::share).map_or_else(|| moving(since(start)), filled);
+        let whole = if self.outer.is_none() && !self.steps.is_empty() { " of this step" } else { "" };
+        let bar = self.all().next().and_then(Step::share).map_or_else(|| moving(since(start)), filled);
         format!("{bar} {}, {left}{whole}, {} so far", self.text(), seconds(since(start)))
     }
 }
@@ -178,17 +179,17 @@ impl Bars {
         Self { quiet }
     }
 
-    /// Starts a step of `total` units called `unit`; 0 if the number is not known.
+    /// Starts a step of `total` units called `unit`; 0 if the number is not known. It is a part of the current step, if there is one.
     pub(crate) fn start(&self, label: &str, unit: &str, total: u64) {
         if !self.quiet {
-            lock(&WORK).step = Some(Step::new(label, unit, total));
+            lock(&WORK).steps.push(Step::new(label, unit, total));
         }
     }
 
     /// Starts `total` parts called `unit`. Steps follow within each part.
     pub(crate) fn start_parts(&self, label: &str, unit: &str, total: u64) {
         if !self.quiet {
-            *lock(&WORK) = Work { outer: Some(Step::new(label, unit, total)), step: None };
+            *lock(&WORK) = Work { outer: Some(Step::new(label, unit, total)), steps: Vec::new() };
         }
     }
 
@@ -202,7 +203,7 @@ impl Bars {
     /// Reports that one more part is done.
     pub(crate) fn part_done(&self) {
         let mut work = lock(&WORK);
-        work.step = None;
+        work.steps.clear();
         if let Some(outer) = work.outer.as_mut() {
             outer.done += 1;
         }
@@ -210,7 +211,7 @@ impl Bars {
 
     /// Reports the end of all parts.
     pub(crate) fn end_parts(&self) {
-        *lock(&WORK) = Work { outer: None, step: None };
+        *lock(&WORK) = Work { outer: None, steps: Vec::new() };
     }
 }
 
@@ -231,19 +232,19 @@ impl Progress for Bars {
     }
 
     fn advance(&self, units: u64) {
-        if let Some(step) = lock(&WORK).step.as_mut() {
+        if let Some(step) = lock(&WORK).steps.last_mut() {
             step.done += units;
         }
     }
 
     fn quality(&self, decibels: f64) {
-        if let Some(step) = lock(&WORK).step.as_mut() {
+        if let Some(step) = lock(&WORK).steps.last_mut() {
             step.quality = Some(decibels);
         }
     }
 
     fn end(&self) {
-        lock(&WORK).step = None;
+        lock(&WORK).steps.pop();
     }
 }
 
@@ -260,10 +261,20 @@ mod tests {
         assert_eq!(text(), "coding, 1,234 of 90,000 Gaussians");
         bars.quality(41.96);
         assert_eq!(text(), "coding, 1,234 of 90,000 Gaussians, 42.0 dB");
+        bars.end();
         bars.begin(Stage::Read, 0);
         assert_eq!(text(), "reading, 0 bytes");
         bars.end();
         assert_eq!(text(), "working");
+        bars.begin(Stage::Look, 2000);
+        bars.begin(Stage::Refine, 800);
+        bars.advance(30);
+        bars.quality(38.0);
+        assert_eq!(text(), "looking, 0 of 2,000 Gaussians; refining, 30 of 800 steps, 38.0 dB");
+        bars.end();
+        bars.advance(1000);
+        assert_eq!(text(), "looking, 1,000 of 2,000 Gaussians");
+        bars.end();
         bars.start_parts("sweeping", "parts", 12);
         bars.say("scene\u{1b}");
         bars.begin(Stage::Draw, 100);
@@ -280,11 +291,11 @@ mod tests {
         let start = Instant::now();
         let at = |seconds| start + Duration::from_secs(seconds);
         let step = |done, total| Step { done, start, ..Step::new("drawing", "views", total) };
-        let nothing = Work { outer: None, step: None };
+        let nothing = Work { outer: None, steps: Vec::new() };
         let idle = [at(5), at(5) + TICK].map(|now| nothing.line(start, now));
         assert_ne!(idle[0], idle[1], "it moves");
         assert!(idle[0].ends_with(" working, time left not known yet, 5 s so far"), "{}", idle[0]);
-        let one = Work { outer: None, step: Some(step(25, 100)) };
+        let one = Work { outer: None, steps: vec![step(25, 100)] };
         let line = one.line(start, at(20));
         assert!(line.starts_with(&format!("{}{}", FULL.repeat(6), EMPTY.repeat(18))), "{line}");
         assert!(
@@ -292,7 +303,7 @@ mod tests {
             "{line}"
         );
         // While no outer unit is done, the time left is that of the step.
-        let both = |done| Work { outer: Some(step(done, 4)), step: Some(step(50, 100)) };
+        let both = |done| Work { outer: Some(step(done, 4)), steps: vec![step(50, 100)] };
         assert!(
             both(0).line(start, at(20)).contains(", about 20 s left, "),
             "{}",

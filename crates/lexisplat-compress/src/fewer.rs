@@ -5,7 +5,6 @@ use lexisplat_render::{Renderer, Scene};
 
 use crate::error::Result;
 use crate::merge::lessened;
-use crate::only_cancels::OnlyCancels;
 use crate::packing_views::PackingViews;
 use crate::refit::Fit;
 
@@ -43,16 +42,16 @@ impl Removal<'_> {
     ) -> Result<(Splats, Sensitivity)> {
         let (mut splats, mut sensitivity) = (splats.clone(), sensitivity);
         self.progress.begin(Stage::Look, (splats.len().saturating_sub(most)) as u64);
-        let inner = &OnlyCancels(self.progress);
         while splats.len() > most {
             let count = share_of(&splats).min(splats.len() - most);
             let keep = lessened(&mut splats, &sensitivity, count);
             let before = splats.len();
             splats.retain(&keep);
             sensitivity.retain(&keep);
-            let fitted = self.fit.appearances(Scene::from(&splats), &sensitivity.appearances(), inner)?;
+            let fitted =
+                self.fit.appearances(Scene::from(&splats), &sensitivity.appearances(), self.progress)?;
             fitted.iter().enumerate().for_each(|(i, shown)| shown.give(&mut splats.geometry, i));
-            sensitivity = self.views.sensitivity(self.renderer, &splats, inner)?;
+            sensitivity = self.views.sensitivity(self.renderer, &splats, self.progress)?;
             self.progress.advance((before - splats.len()) as u64);
         }
         self.progress.end();

@@ -10,7 +10,7 @@ use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Scene};
 
 use crate::error::Result;
-use crate::only_cancels::OneStep;
+use crate::one_step::OneStep;
 use crate::solve::{KEPT_BYTES, ROW, kinds, solve};
 
 /// Number of solutions: for sizes, for opacities and for colours.

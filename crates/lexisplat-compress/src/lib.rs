@@ -52,7 +52,7 @@ mod memo;
 mod merge;
 mod natural_width;
 mod observed_directions;
-mod only_cancels;
+mod one_step;
 mod packing;
 mod packing_views;
 mod part_step;

@@ -9,7 +9,6 @@ use crate::effort::Refine;
 use crate::error::{Error, Result};
 use crate::fewer::Removal;
 use crate::memo::{memo_of, views_of};
-use crate::only_cancels::OnlyCancels;
 use crate::packing::Packing;
 use crate::packing_views::PackingViews;
 use crate::part_step::{PartJudge, part_step};
@@ -105,8 +104,6 @@ impl Parts<'_> {
         if part.is_empty() {
             return Ok((Sensitivity::default().into(), None));
         }
-        // The surrounding work reports progress in Gaussians, not in views.
-        let progress = &OnlyCancels(progress);
         let (views, even) = PackingViews::found_of_part(renderer, part, progress)?;
         let sensitivity = views.sensitivity(renderer, part, progress)?;
         let mut judge = PartJudge::new(part, [&views.judging_part(), &even], progress)?;
@@ -148,7 +145,6 @@ pub(crate) fn refit(
     gaussians: usize,
     progress: &dyn Progress,
 ) -> Result<Vec<Appearance>> {
-    let progress = &OnlyCancels(progress);
     let views = views_of(memo)?;
     if let Some(effort) = refine {
         let effort = effort.of_part(part.len(), gaussians);

@@ -15,7 +15,7 @@ use crate::drawing::{DrawOptions, draw_views};
 use crate::effort::RefineSteps;
 use crate::error::Result;
 use crate::interim::interim_changes;
-use crate::only_cancels::OneStep;
+use crate::one_step::OneStep;
 use crate::refine::{Free, Refining, RestCost};
 use crate::solve::{KEPT_BYTES, ROW, kinds, solve};
 

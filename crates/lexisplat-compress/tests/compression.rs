@@ -1,8 +1,8 @@
 //! The pipeline as programs, windows and bindings call it.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::{CompressOptions, Layout, Limits, Progress, Silent, Splats, Stage, lexi, ply};
@@ -150,9 +150,14 @@ fn memory_decides_between_whole_and_part_by_part() {
     assert!(report.in_parts && report.sensitivity == Some(SensitivitySource::Views));
     assert!(whole != parts);
     let refined = Packing::new(Target::MeanPsnr(33.0)).with_refine(Refine::Minutes(0.001));
-    let (_, report) = run(refined.with_memory(1000), &splats);
+    let told = Stages::default();
+    let report = Compression::from(refined.with_memory(1000)).run(&splats, &mut Vec::new(), &told).unwrap();
     assert!(report.in_parts && report.sensitivity == Some(SensitivitySource::Views));
     let made = report.refined.unwrap();
+    // A part is refined within the step that looks at it.
+    assert!(told.current.into_inner().unwrap().is_empty() && told.qualities.into_inner() > 0);
+    let around = told.around_refining.into_inner().unwrap();
+    assert!(around.contains(&Stage::Look), "{around:?}");
     assert!(made.steps > 1 && report.gaussians <= made.gaussians, "{made:?}");
     assert_eq!(report.removed, (splats.len() - report.gaussians) as u64);
     let (_, report) = run(Compression::Guessed(Preset::Small, PackOptions::default()), &splats);
@@ -203,6 +208,43 @@ fn one_look_serves_several_files() {
     for preset in [Preset::Small, Preset::High] {
         let known = Packing::new(preset).with_looked(Arc::clone(&looked));
         assert!(run(known, &splats).0 == run(Packing::new(Quality::Preset(preset)), &splats).0);
+    }
+}
+
+/// Holds progress to its rules: stages are within one another, and none does more units than it has.
+#[derive(Default)]
+struct Stages {
+    /// The current stages, with the units that are left of each.
+    current: Mutex<Vec<(Stage, u64)>>,
+    /// The stages that a stage of refining was a part of.
+    around_refining: Mutex<Vec<Stage>>,
+    qualities: AtomicU64,
+}
+
+impl Progress for Stages {
+    fn begin(&self, stage: Stage, total: u64) {
+        let mut current = self.current.lock().unwrap();
+        if stage == Stage::Refine {
+            self.around_refining.lock().unwrap().extend(current.iter().map(|(stage, _)| *stage));
+        }
+        current.push((stage, total));
+    }
+
+    fn advance(&self, units: u64) {
+        let mut current = self.current.lock().unwrap();
+        let (stage, left) = current.last_mut().unwrap();
+        *left = left.checked_sub(units).unwrap_or_else(|| panic!("{units} of {stage:?}, {left} are left"));
+    }
+
+    fn quality(&self, decibels: f64) {
+        assert!(decibels > 0.0, "{decibels}");
+        self.qualities.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn end(&self) {
+        let (stage, left) = self.current.lock().unwrap().pop().unwrap();
+        // Learning ends once it gains no more.
+        assert!(left == 0 || stage == Stage::Learn, "{left} of {stage:?} are left");
     }
 }
 

@@ -24,13 +24,15 @@ type Report = (&'static str, u64, u64);
 pub(crate) struct Watch {
     state: Mutex<State>,
     finished: Condvar,
+    /// Number of units done in the current stage.
     done: AtomicU64,
     cancelled: AtomicBool,
 }
 
 #[derive(Debug, Default)]
 struct State {
-    stage: Option<(&'static str, u64)>,
+    /// The stages that began and did not end: each within the one before, with the units that were done when the next began.
+    stages: Vec<Report>,
     /// Reports of stages that began or ended and were not passed on yet. The number of units done in the current stage is
     /// not among them.
     reports: Vec<Report>,
@@ -53,7 +55,8 @@ impl Watch {
     fn reports(&self) -> Vec<Report> {
         let mut state = self.state();
         let mut reports = std::mem::take(&mut state.reports);
-        let current = state.stage.map(|(name, total)| (name, self.done.load(Ordering::Relaxed), total));
+        let current =
+            state.stages.last().map(|&(name, _, total)| (name, self.done.load(Ordering::Relaxed), total));
         reports.extend(current.filter(|&(_, done, _)| done > 0));
         reports
     }
@@ -82,8 +85,11 @@ impl Progress for Watch {
             _ => "work",
         };
         let mut state = self.state();
-        self.done.store(0, Ordering::Relaxed);
-        state.stage = Some((name, total));
+        let done = self.done.swap(0, Ordering::Relaxed);
+        if let Some(around) = state.stages.last_mut() {
+            around.1 = done;
+        }
+        state.stages.push((name, 0, total));
         state.reports.push((name, 0, total));
     }
 
@@ -93,8 +99,10 @@ impl Progress for Watch {
 
     fn end(&self) {
         let mut state = self.state();
-        if let Some((name, total)) = state.stage.take() {
-            state.reports.push((name, self.done.load(Ordering::Relaxed), total));
+        if let Some((name, _, total)) = state.stages.pop() {
+            let around = state.stages.last().map_or(0, |around| around.1);
+            let done = self.done.swap(around, Ordering::Relaxed);
+            state.reports.push((name, done, total));
         }
     }
 

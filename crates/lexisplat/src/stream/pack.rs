@@ -75,6 +75,7 @@ fn whole<E: From<Error>>(
             Sensitivity::guess_of_part(&splats.geometry, total).into()
         }
     };
+    progress.advance(splats.len() as u64);
     progress.end();
     observed.check(&splats, options)?;
     let Observed { instead, sensitivity, step_factor, memo } = observed;

@@ -4,7 +4,8 @@ use crate::support::error::{Error, Result};
 
 /// Receives progress from long work, and may cancel it. All methods may be called from worker threads.
 pub trait Progress: Sync {
-    /// Is told that a stage starts. The stage has `total` units of work, or an unknown number if `total` is 0.
+    /// Is told that a stage starts. The stage has `total` units of work, or an unknown number if `total` is 0. A stage that starts
+    /// before the end of another is a part of it, and is the current stage until it ends.
     fn begin(&self, stage: Stage, total: u64) {
         let _ = (stage, total);
     }
@@ -19,7 +20,7 @@ pub trait Progress: Sync {
         let _ = decibels;
     }
 
-    /// Is told that the current stage is over.
+    /// Is told that the current stage is over. The stage around it is the current stage again, if there is one.
     fn end(&self) {}
 
     /// Returns whether the work is to end early. Work that finds `true` returns [`Error::Cancelled`] soon and leaves no
