@@ -179,6 +179,7 @@ impl<'a> Compress<'a> {
         let whole = self.compression().holds_whole(bytes.len() as u64, beside.is_some());
         let opened =
             lexisplat_formats::open(&name, &bytes, Siblings::of(path), &self.read, whole, self.progress)?;
+        let opened = opened.releasing_pages_of(&bytes);
         if matches!(opened, Opened::Lexi(_)) {
             return Err(Error::format(&name, "is a .lexi already: expected a scene that is not compressed"));
         }

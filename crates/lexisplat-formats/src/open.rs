@@ -2,7 +2,7 @@
 
 use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySource, ReadOptions};
-use lexisplat::{Error, FileKind, Progress, Result, SplatSource, without_byte_order_mark};
+use lexisplat::{Error, FileKind, Input, Progress, Result, SplatSource, without_byte_order_mark};
 
 use crate::kind::Kind;
 use crate::siblings::Siblings;
@@ -24,6 +24,18 @@ pub enum Opened<'a> {
     Lexi(Box<LexiReader<'a>>),
     /// A scene of another format.
     Other(Kind, Box<FormatSource<'a>>),
+}
+
+impl<'a> Opened<'a> {
+    /// Gives the pages of `input`, whose bytes were opened, back to the system now and after each part of a PLY that is read
+    /// ([`PlySource::releasing_pages_of`]).
+    #[must_use]
+    pub fn releasing_pages_of(self, input: &'a Input) -> Self {
+        match self {
+            Self::Ply(source) => Self::Ply(Box::new(source.releasing_pages_of(input))),
+            other => other,
+        }
+    }
 }
 
 impl Opened<'_> {

@@ -13,7 +13,7 @@ use pyo3::types::PyDict;
 use serde::Serialize;
 
 use crate::arrays::{ShOrder, finite_from_python, to_python};
-use crate::bytes::{Given, limits};
+use crate::bytes::{Bytes, Given, limits};
 use crate::errors::{Result, parameter, raise};
 use crate::work::without_gil;
 
@@ -76,9 +76,14 @@ pub(crate) fn with_source<T>(
         Given::Memory(_) => None,
     };
     let siblings = path.as_deref().map_or(Siblings::NONE, Siblings::of);
-    let bytes = path.clone().map_or(given, Given::Path).bytes(&options.limits)?;
-    let bytes = bytes.as_ref();
-    match open(name, bytes, siblings, options, whole(bytes.len() as u64), progress)? {
+    let given = path.clone().map_or(given, Given::Path).bytes(&options.limits)?;
+    let bytes = given.as_ref();
+    let opened = open(name, bytes, siblings, options, whole(bytes.len() as u64), progress)?;
+    let opened = match &given {
+        Bytes::File(input) => opened.releasing_pages_of(input),
+        _ => opened,
+    };
+    match opened {
         Opened::Lexi(_) => Err(Error::format(name, "it is compressed already")),
         opened => work(opened.some(name)?),
     }

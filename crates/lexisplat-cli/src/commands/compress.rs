@@ -76,8 +76,11 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let may_look = args.looks_beside() && compression.holds_whole(all_bytes, true);
     let beside = if may_look && !is_pipe(first) { read_beside(first) } else { None };
     let whole = compression.holds_whole(all_bytes, beside.is_some());
-    let opened = files.iter().map(|(name, bytes)| open(name, bytes, siblings(name), &read, whole, &bars));
-    let opened = opened.collect::<Result<Vec<_>, _>>()?;
+    let opened = files.iter().map(|(name, bytes)| {
+        let opened = open(name, bytes, siblings(name), &read, whole, &bars)?;
+        Ok(opened.releasing_pages_of(bytes))
+    });
+    let opened = opened.collect::<Result<Vec<_>>>()?;
     for ((name, _), opened) in files.iter().zip(&opened) {
         warn(name, opened.source().warnings());
     }

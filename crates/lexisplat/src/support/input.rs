@@ -75,6 +75,18 @@ impl Input {
     }
 }
 
+impl Input {
+    /// Gives the pages of a mapped file back to the system, which keeps them for as long as it has room. The bytes stay as they
+    /// are: a page is read again when it is needed. Otherwise a file of which every part was read counts whole as resident
+    /// memory. It does nothing for a copy, and on Windows.
+    pub fn release_pages(&self) {
+        #[cfg(all(feature = "mmap", unix))]
+        if let Bytes::Mapped(map) = &self.0 {
+            release(map);
+        }
+    }
+}
+
 impl From<Vec<u8>> for Input {
     fn from(bytes: Vec<u8>) -> Self {
         Self(Bytes::Owned(bytes))
@@ -90,6 +102,17 @@ fn map(file: &std::fs::File) -> io::Result<memmap2::Mmap> {
     // that out, and no reader here relies on it. The module's documentation says so, and the `mmap` feature turns
     // mapping off.
     unsafe { memmap2::MmapOptions::new().map_copy_read_only(file) }
+}
+
+#[cfg(all(feature = "mmap", unix))]
+#[expect(unsafe_code, reason = "memory mapping; see the module's documentation")]
+fn release(map: &memmap2::Mmap) {
+    // SAFETY: the mapping is read-only, so its pages are those of the file, and a page that is read again has the same bytes.
+    // So slices of the mapping stay as they are. (`memmap2` warns of writable mappings, which lose what was written.) The
+    // file may have changed, as `map` says.
+    let advised = unsafe { map.unchecked_advise(memmap2::UncheckedAdvice::DontNeed) };
+    // A system that refuses the advice keeps the pages.
+    let _ = advised;
 }
 
 impl Deref for Input {
@@ -113,6 +136,43 @@ impl AsRef<[u8]> for Input {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Kilobytes of the file `name` that are resident in mappings of this process.
+    #[cfg(all(feature = "mmap", target_os = "linux"))]
+    fn resident(name: &str) -> u64 {
+        let mut of_file = false;
+        let mut sum = 0;
+        for line in std::fs::read_to_string("/proc/self/smaps").unwrap().lines() {
+            match line.strip_prefix("Rss:") {
+                Some(size) if of_file => {
+                    sum += size.trim().trim_end_matches(" kB").parse::<u64>().unwrap();
+                }
+                Some(_) => {}
+                // Only the first line of a mapping has an address and perhaps a path.
+                None if line.contains('-') && !line.contains(" kB") => of_file = line.ends_with(name),
+                None => {}
+            }
+        }
+        sum
+    }
+
+    #[test]
+    #[cfg(all(feature = "mmap", target_os = "linux"))]
+    fn released_pages_are_not_resident_and_are_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pages-to-release");
+        let bytes: Vec<u8> = (0..1_000_000_u32).map(|i| i.wrapping_mul(37).to_le_bytes()[1]).collect();
+        std::fs::write(&path, &bytes).unwrap();
+        let input = Input::open(&path).unwrap();
+        for _ in 0..2 {
+            assert_eq!(*input, *bytes);
+            assert!(resident("pages-to-release") > 900);
+            input.release_pages();
+            assert_eq!(resident("pages-to-release"), 0);
+        }
+        assert_eq!(*input, *bytes);
+        Input::from(vec![1, 2]).release_pages();
+    }
 
     /// A mapped file holds the same bytes as a file that was read.
     #[test]

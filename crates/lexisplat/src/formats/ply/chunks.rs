@@ -16,6 +16,7 @@ use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::{SceneMeta, Splats};
 use crate::support::error::Result;
+use crate::support::input::Input;
 use crate::support::progress::{Progress, Silent, Stage};
 
 /// Number of rows that are read together when a file is opened.
@@ -31,6 +32,8 @@ pub struct PlySource<'a> {
     normals: bool,
     /// The scene, if it was read when the file was opened and is not taken yet.
     whole: Mutex<Option<Splats>>,
+    /// The file, if its pages are given back.
+    input: Option<&'a Input>,
 }
 
 /// A scene and a description of its file.
@@ -102,7 +105,7 @@ impl<'a> PlySource<'a> {
         let Found { bad: dropped, normals, position_facts, .. } = found;
         file.settle(position_facts);
         let dropped = DroppedRows::new(dropped);
-        Ok((Self { file, dropped, normals, whole: Mutex::default() }, splats))
+        Ok((Self { file, dropped, normals, whole: Mutex::default(), input: None }, splats))
     }
 
     /// Adds the normals to `splats`, which hold rows `rows`, and leaves the dropped rows out.
@@ -122,6 +125,21 @@ impl<'a> PlySource<'a> {
         let splats = self.whole()?.into_owned();
         let PlyFile { warnings, summary, .. } = self.file;
         Ok(PlyRead { splats, warnings, summary })
+    }
+
+    /// Gives the pages of `input`, whose bytes were opened, back to the system now and after each part that is read
+    /// ([`Input::release_pages`]). A scene that is read a part at a time then takes little resident memory.
+    #[must_use]
+    pub fn releasing_pages_of(mut self, input: &'a Input) -> Self {
+        self.input = Some(input);
+        self.release();
+        self
+    }
+
+    fn release(&self) {
+        if let Some(input) = self.input {
+            input.release_pages();
+        }
     }
 
     /// Returns the SH degree.
@@ -179,7 +197,9 @@ impl SplatSource for PlySource<'_> {
         let rows = self.dropped.rows(&range, self.file.count)?;
         self.file.check_memory(rows.len(), self.normals)?;
         self.file.fill(rows.clone(), splats, &Silent)?;
-        self.finish(rows, splats)
+        self.finish(rows, splats)?;
+        self.release();
+        Ok(())
     }
 
     fn whole(&self) -> Result<Cow<'_, Splats>> {
