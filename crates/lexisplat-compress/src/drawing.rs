@@ -70,7 +70,7 @@ pub(crate) fn draw_each<T>(
     scene: &Scene<'_>,
     cameras: &[Camera],
     options: &DrawOptions,
-    with: impl Fn(Image) -> T,
+    mut with: impl FnMut(Image) -> T,
     progress: &dyn Progress,
 ) -> Result<Vec<T>> {
     let prepared = renderer.prepare(*scene)?;

@@ -44,6 +44,7 @@ mod error;
 mod facts;
 mod fewer;
 mod first_view;
+mod fit_pictures;
 mod found;
 mod interim;
 mod judge;

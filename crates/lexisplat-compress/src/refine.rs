@@ -6,13 +6,13 @@
 use lexisplat::sh::{C0, MAX_REST, rest_basis};
 use lexisplat::simd::Simd;
 use lexisplat::{Progress, Sensitivity, Splats, Stage};
-use lexisplat_render::{Camera, Differentiator, GaussianGradient, Image, PictureGradient, Renderer, Scene};
+use lexisplat_render::{Camera, Differentiator, GaussianGradient, Image, PictureGradient};
 use rayon::prelude::*;
 
 use crate::decibels::decibels;
-use crate::drawing::{DrawOptions, draw_each};
 use crate::effort::{Refine, RefineSteps};
 use crate::error::Result;
+use crate::fit_pictures::fit_pictures;
 
 /// Weights of the past in the moving averages of Adam. The second is smaller than the usual 0.999, since a Gaussian takes
 /// few steps.
@@ -138,9 +138,7 @@ impl Refining {
         effort: Refine,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
-        let bytes = |image: Image| image.to_8bit();
-        let targets = draw_each(&mut cpu, &Scene::from(splats), &cameras, &options, bytes, progress)?;
+        let targets = fit_pictures(splats, &cameras, progress)?;
         let pixels: usize = targets.iter().map(Vec::len).sum();
         let steps = effort.steps(pixels as f64 / targets.len().max(1) as f64, splats.len());
         Ok(Self { cameras, targets, steps })
@@ -360,7 +358,7 @@ mod tests {
     use std::sync::Mutex;
 
     use lexisplat::Silent;
-    use lexisplat_render::orbit;
+    use lexisplat_render::{Renderer, orbit};
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;

@@ -48,6 +48,17 @@ impl TileSet {
         self.pixels
     }
 
+    /// Returns the tiles that are in this set or in `other`, which must be of a picture of the same size.
+    #[must_use]
+    pub fn with(&self, other: &Self) -> Self {
+        let [width, height] = self.size;
+        let columns = width.div_ceil(TILE_U32);
+        Self::new(width, height, |column, row| {
+            let tile = row * columns + column;
+            [self, other].iter().any(|set| set.tiles.binary_search(&tile).is_ok())
+        })
+    }
+
     /// Returns the tiles of a picture of half the width and height that contain one of these tiles.
     #[must_use]
     pub fn halved(&self) -> Self {
@@ -124,6 +135,13 @@ mod tests {
         assert!(TileSet::new(40, 20, |_, _| false).check(40, 20).is_err());
         assert_eq!((last.place_of_drawn(17), last.place_of_drawn(256)), (Some([33, 17]), None));
         assert_eq!((last.drawn_at([33, 17]), last.drawn_at([31, 17])), (Some(17), None));
+    }
+
+    #[test]
+    fn joined_sets_have_the_tiles_of_both() {
+        let sets = [(2, 0), (0, 1), (2, 0)].map(|wanted| TileSet::new(40, 20, |x, y| (x, y) == wanted));
+        assert_eq!(sets[0].with(&sets[1]), TileSet::new(40, 20, |x, y| x + 2 * y == 2));
+        assert_eq!(sets[0].with(&sets[2]), sets[0]);
     }
 
     #[test]
