@@ -17,6 +17,8 @@ const FIRST_DB: f64 = 60.0;
 /// Fall of the quality by one removal, as a share of the fall by the removal before, in dB for the same share of Gaussians. It is 0.50
 /// (room) to 0.77 (room-large) near 40 dB.
 const NEXT_FALL: f64 = 0.6;
+/// Amount by which the quality after the last removal may exceed the quality asked for, in dB. If it is more, a little more is removed.
+const SPARE_DB: f64 = 0.4;
 
 /// Removes and merges Gaussians, and fits base colours and opacities of the others.
 pub(crate) struct Removal<'a> {
@@ -59,8 +61,8 @@ impl Removal<'_> {
     }
 
     /// Makes `splats` fewer while their `quality` is at least `decibels`, about. Returns them and their sensitivity, as
-    /// [`Self::at_most`] does. The last number follows from the falls of the quality before, so that no removal goes too far and
-    /// is made once more.
+    /// [`Self::at_most`] does. The number after the last whole removal follows from the falls of the quality before, so that no
+    /// removal goes too far and is made once more.
     ///
     /// # Errors
     /// As [`Self::at_most`], and errors of `quality`.
@@ -78,7 +80,15 @@ impl Removal<'_> {
             let before = last.unwrap_or(FIRST_DB);
             if let Some(next) = fall.map(|fall: f64| NEXT_FALL * fall).filter(|next| before - next < decibels)
             {
-                return self.at_most(after_share(&splats, (before - decibels) / next), &splats, sensitivity);
+                let share = (before - decibels) / next;
+                let made = self.at_most(after_share(&splats, share), &splats, sensitivity)?;
+                let after = quality(&made.0)?;
+                if after < decibels + SPARE_DB {
+                    return Ok(made);
+                }
+                // The quality falls less from removal to removal, so this does not go too far.
+                let share = share * (after - decibels) / (before - after);
+                return self.at_most(after_share(&made.0, share), &made.0, made.1);
             }
             let fewer = self.at_most(after_share(&splats, 1.0), &splats, sensitivity.clone())?;
             let after = quality(&fewer.0)?;
@@ -111,11 +121,12 @@ fn share_of(splats: &Splats) -> usize {
 #[cfg(test)]
 mod tests {
     use lexisplat::Silent;
+    use lexisplat_render::orbit;
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
     use crate::views::Viewpoints;
-    use crate::{Judge, Looked};
+    use crate::{Error, Judge, Looked};
 
     #[test]
     fn what_stays_is_more_like_all_than_what_a_guess_leaves() {
@@ -136,5 +147,29 @@ mod tests {
         let mut judge = Judge::new(cpu, &all, &views.some_judging(12), false, &Silent).unwrap();
         let [made, guessed] = [&made.0, &guessed].map(|scene| judge.score(scene, &Silent).unwrap().mean);
         assert!(made > guessed + 3.0, "{made} {guessed}");
+    }
+
+    #[test]
+    fn the_quality_after_removal_is_about_that_asked_for() {
+        let all = scene(&SampleOptions::new(1000, 3));
+        let cameras = orbit(&all.geometry, 24, 96, 72);
+        let Looked { views, sensitivity } =
+            Looked::at(&mut Renderer::cpu(), &all, Some(&cameras), Viewpoints::Auto, &Silent).unwrap();
+        let fit = Fit::to(&all, views.fitting(&all), views.are_given(), &Silent).unwrap();
+        let judges = views.some_judging(12);
+        let mut judge = Judge::new(Renderer::cpu(), &all, &judges, true, &Silent).unwrap();
+        for asked in [27.0, 31.0, 34.0] {
+            let mut scored = 0;
+            let mut renderer = Renderer::cpu();
+            let mut removal =
+                Removal { views: &views, renderer: &mut renderer, fit: &fit, progress: &Silent };
+            let mut score = |splats: &Splats| {
+                scored += 1;
+                Ok::<_, Error>(judge.score(splats, &Silent)?.mean)
+            };
+            let made = removal.down_to(asked, &all, sensitivity.clone(), &mut score).unwrap();
+            let reached = score(&made.0).unwrap();
+            assert!((reached - asked).abs() < 1.0, "{reached} instead of {asked}, {scored} tries");
+        }
     }
 }
