@@ -158,7 +158,7 @@ mod tests {
         let fit = Fit::to(&all, views.fitting(&all), views.are_given(), &Silent).unwrap();
         let judges = views.some_judging(12);
         let mut judge = Judge::new(Renderer::cpu(), &all, &judges, true, &Silent).unwrap();
-        for asked in [27.0, 31.0, 34.0] {
+        for asked in [27.0, 34.0] {
             let mut scored = 0;
             let mut renderer = Renderer::cpu();
             let mut removal =
