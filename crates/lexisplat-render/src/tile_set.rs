@@ -52,10 +52,9 @@ impl TileSet {
     #[must_use]
     pub fn with(&self, other: &Self) -> Self {
         let [width, height] = self.size;
-        let columns = width.div_ceil(TILE_U32);
         Self::new(width, height, |column, row| {
-            let tile = row * columns + column;
-            [self, other].iter().any(|set| set.tiles.binary_search(&tile).is_ok())
+            let corner = [column, row].map(|k| k as usize * TILE);
+            [self, other].iter().any(|set| set.drawn_at(corner).is_some())
         })
     }
 

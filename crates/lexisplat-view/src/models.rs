@@ -142,6 +142,8 @@ pub(crate) struct JobStep {
     label: String,
     done: u64,
     total: u64,
+    /// Number of stages that began and did not end. Only the outermost of them is shown.
+    stages: usize,
 }
 
 /// Progress of a job. The thread of the job writes it, and the panel reads it.
@@ -150,7 +152,7 @@ pub(crate) struct JobProgress(Mutex<JobStep>);
 
 impl JobProgress {
     fn start(&self, label: &str, total: u64) {
-        *self.lock() = JobStep { label: label.to_owned(), done: 0, total };
+        *self.lock() = JobStep { label: label.to_owned(), total, ..JobStep::default() };
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, JobStep> {
@@ -177,12 +179,22 @@ impl Progress for JobProgress {
             Stage::Write => "writing",
             _ => "working",
         };
-        self.start(label, total);
+        if self.lock().stages == 0 {
+            self.start(label, total);
+        }
+        self.lock().stages += 1;
     }
 
     fn advance(&self, units: u64) {
         let mut step = self.lock();
-        step.done = step.done.saturating_add(units);
+        if step.stages <= 1 {
+            step.done = step.done.saturating_add(units);
+        }
+    }
+
+    fn end(&self) {
+        let mut step = self.lock();
+        step.stages = step.stages.saturating_sub(1);
     }
 }
 
@@ -305,6 +317,22 @@ mod tests {
     use super::*;
 
     const SIZE: OrbitSize = OrbitSize { views: 3, max_width: 100, near: None };
+
+    #[test]
+    fn a_stage_within_another_is_not_shown() {
+        let progress = JobProgress::default();
+        progress.begin(Stage::Code, 100);
+        progress.advance(25);
+        progress.begin(Stage::Draw, 8);
+        progress.advance(8);
+        assert_eq!(progress.read(), ("coding".to_owned(), Some(0.25)));
+        progress.end();
+        progress.advance(25);
+        assert_eq!(progress.read(), ("coding".to_owned(), Some(0.5)));
+        progress.end();
+        progress.begin(Stage::Write, 4);
+        assert_eq!(progress.read(), ("writing".to_owned(), Some(0.0)));
+    }
 
     #[test]
     fn compressing_makes_what_a_file_would_hold() {

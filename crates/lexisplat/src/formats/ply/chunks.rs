@@ -234,6 +234,7 @@ impl SplatSource for PlySource<'_> {
                 self.file.layout.groups[REST].read(Packed { bytes, row_bytes, big }, out);
             }
         }
+        self.release();
         Ok(())
     }
 }
