@@ -445,6 +445,7 @@ impl PackingViews {
 #[cfg(test)]
 mod tests {
     use lexisplat::Silent;
+    use lexisplat_render::orbit;
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
@@ -476,6 +477,18 @@ mod tests {
         let places: std::collections::HashSet<[u32; 3]> =
             fitted.iter().map(|camera| camera.position.map(f32::to_bits)).collect();
         assert!(places.len() > fitted.len() * 9 / 10, "{} of {}", places.len(), fitted.len());
+    }
+
+    #[test]
+    fn every_fifth_view_beside_given_cameras_is_fitted_to_at_half_its_size() {
+        let splats = scene(&SampleOptions::new(300, 3));
+        let cameras = orbit(&splats.geometry, 12, 96, 64);
+        let views = PackingViews::given(&cameras).unwrap();
+        let (_, fitted) = views.for_refining(&mut Renderer::cpu(), &splats, &Silent).unwrap();
+        // The first views lie between and beside the cameras, and are as wide as these. Found views have other widths.
+        for (k, camera) in fitted.iter().enumerate().take(REFINED_BETWEEN.len() * cameras.len()) {
+            assert_eq!(camera.width, if k % REFINED_HALVED == 1 { 48 } else { 96 }, "{k}");
+        }
     }
 
     #[test]
