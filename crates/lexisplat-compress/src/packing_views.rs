@@ -59,7 +59,7 @@ pub(crate) const MOST_REFINED_PIXELS: u64 = 96_000_000;
 const MEASURED_HALVED: usize = 2;
 const FITTED_HALVED: usize = 3;
 /// Every `REFINED_HALVED`-th view to which everything is fitted beside given cameras is at half its size. Without such views pictures of
-/// half the width show 1.0 (room) to 1.1 dB (fern) less (docs/METHOD.md, "Refining").
+/// half the width show 1.0 (room) to 1.1 dB (fern) less (docs/METHOD.md, appendix, "Pictures of half the size").
 const REFINED_HALVED: usize = 5;
 /// Largest number of given cameras that are used. They are chosen evenly.
 const MAX_VIEWS: usize = 150;
@@ -485,7 +485,7 @@ mod tests {
         let cameras = orbit(&splats.geometry, 12, 96, 64);
         let views = PackingViews::given(&cameras).unwrap();
         let (_, fitted) = views.for_refining(&mut Renderer::cpu(), &splats, &Silent).unwrap();
-        // The first views lie between and beside the cameras, and are as wide as these. Found views have other widths.
+        // The first views lie between the cameras, and are as wide as these. Found views have other widths.
         for (k, camera) in fitted.iter().enumerate().take(REFINED_BETWEEN.len() * cameras.len()) {
             assert_eq!(camera.width, if k % REFINED_HALVED == 1 { 48 } else { 96 }, "{k}");
         }
