@@ -59,8 +59,10 @@ pub(crate) const MOST_REFINED_PIXELS: u64 = 96_000_000;
 const MEASURED_HALVED: usize = 2;
 const FITTED_HALVED: usize = 3;
 /// Every `REFINED_HALVED`-th view to which everything is fitted beside given cameras is at half its size. Without such views pictures of
-/// half the width show 1.0 (room) to 1.1 dB (fern) less (docs/METHOD.md, appendix, "Pictures of half the size").
+/// half the width show 1.0 (room) to 1.1 dB (fern) less (docs/METHOD.md, appendix, "Smaller pictures"). Every `REFINED_QUARTERED`-th
+/// is at a quarter of its size. Without these views pictures of a third of the width show 0.6 (room-large) to 1.3 dB (fern) less.
 const REFINED_HALVED: usize = 5;
+const REFINED_QUARTERED: usize = 10;
 /// Largest number of given cameras that are used. They are chosen evenly.
 const MAX_VIEWS: usize = 150;
 /// Every `JUDGE_SHARE`-th given camera judges. All given cameras measure, so the judging views score up to 0.1 dB better
@@ -108,9 +110,9 @@ impl Pixels {
     }
 }
 
-/// Halves the size of every `n`-th view, from the second one.
-fn halve_every(n: usize, views: &mut [Camera]) {
-    views.iter_mut().skip(1).step_by(n).for_each(|camera| *camera = camera.halved());
+/// Halves the size of every `n`-th view, from the view `first` on.
+fn halve_every(n: usize, first: usize, views: &mut [Camera]) {
+    views.iter_mut().skip(first).step_by(n).for_each(|camera| *camera = camera.halved());
 }
 
 /// The views of a scene and its sensitivity, for several files of the scene.
@@ -382,7 +384,9 @@ impl PackingViews {
         let stride = found.len().div_ceil(REFINED_FOUND).max(1);
         self.measuring.extend(found.into_iter().step_by(stride));
         fitted.extend(self.not_judging().cloned());
-        halve_every(REFINED_HALVED, &mut fitted);
+        halve_every(REFINED_HALVED, 1, &mut fitted);
+        halve_every(REFINED_QUARTERED, 3, &mut fitted);
+        halve_every(REFINED_QUARTERED, 3, &mut fitted);
         Ok((self, sampled_again(fitted, REFINED_PIXELS, MOST_REFINED_PIXELS)))
     }
 
@@ -406,7 +410,7 @@ impl PackingViews {
         let mut around = surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES);
         black_and_white(&mut around);
         views.extend(around);
-        halve_every(FITTED_HALVED, &mut views);
+        halve_every(FITTED_HALVED, 1, &mut views);
         sampled(views, pixels)
     }
 
@@ -480,14 +484,19 @@ mod tests {
     }
 
     #[test]
-    fn every_fifth_view_beside_given_cameras_is_fitted_to_at_half_its_size() {
+    fn some_views_beside_given_cameras_are_fitted_to_at_half_and_a_quarter_of_their_size() {
         let splats = scene(&SampleOptions::new(300, 3));
         let cameras = orbit(&splats.geometry, 12, 96, 64);
         let views = PackingViews::given(&cameras).unwrap();
         let (_, fitted) = views.for_refining(&mut Renderer::cpu(), &splats, &Silent).unwrap();
         // The first views lie between the cameras, and are as wide as these. Found views have other widths.
         for (k, camera) in fitted.iter().enumerate().take(REFINED_BETWEEN.len() * cameras.len()) {
-            assert_eq!(camera.width, if k % REFINED_HALVED == 1 { 48 } else { 96 }, "{k}");
+            let width = match [k % REFINED_HALVED, k % REFINED_QUARTERED] {
+                [1, _] => 48,
+                [_, 3] => 24,
+                _ => 96,
+            };
+            assert_eq!(camera.width, width, "{k}");
         }
     }
 
