@@ -5,9 +5,10 @@ all_targets=(packed feed lexi ply entropy scene dictionary colmap transforms cam
 corpus=${FUZZ_CORPUS:-$PWD/corpus}
 toolchain=${FUZZ_TOOLCHAIN:-nightly}
 
-# Builds all targets, sets `programs` to the folder they are in, and writes the seeds.
+# build [OPTION...]: builds all targets with options of `cargo fuzz build`, sets `programs` to the folder they are in, and
+# writes the seeds.
 build() {
-  cargo "+$toolchain" fuzz build
+  cargo "+$toolchain" fuzz build "$@"
   local host
   host=$(rustc "+$toolchain" -vV | sed -n 's/^host: //p')
   programs=${CARGO_TARGET_DIR:-target}/$host/release

@@ -18,9 +18,9 @@ use crate::target::Target;
 const NEXT_BELOW_GIVEN: [f64; 2] = [-1.5, -6.0];
 const BELOW_FOUND: f64 = -5.0;
 /// Least amount by which the quality exceeds the quality asked for after the fit, in dB. Quantisation uses it up. With less
-/// it needs so fine steps that the file becomes larger. lego with 1.96 takes 0.92 of the bytes of the next try, in which more
-/// Gaussians stay (docs/METHOD.md, "Refining").
-const ABOVE: f64 = 1.7;
+/// it needs so fine steps that the file becomes larger. lego with 1.1 and 1.5 takes 0.94 of the bytes of the next try, in which
+/// more Gaussians stay (docs/METHOD.md, appendix, "After the last removal").
+const ABOVE: f64 = 1.0;
 /// Approximate gain by fits to the quantised scene, as a share of the amount by which the quality exceeds the quality asked for
 /// before quantisation: with given cameras, which have 0.1 (lego) to 0.7 (room), and with found views.
 const GAIN_GIVEN: f64 = 0.55;
