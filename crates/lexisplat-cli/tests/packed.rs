@@ -111,6 +111,20 @@ fn cameras_that_lie_beside_a_scene_are_used() {
     let (used, said) = compress(&[]);
     assert!(used == true && said.contains("by the 12 cameras of cameras.json; --no-cameras"), "{said}");
     let found = file();
+    let compare = |more: &[&str]| {
+        let arguments = [&["compare", "scene.ply", "scene.lexi", "--json", "--device", "cpu"], more].concat();
+        let output = lexisplat().current_dir(folder.0.path()).args(arguments).output().unwrap();
+        let score: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (score, String::from_utf8(output.stderr).unwrap())
+    };
+    let (by_beside, said) = compare(&["--width", "64"]);
+    assert!(said.contains("from 12 of the 12 cameras of cameras.json; --no-cameras"), "{said}");
+    let (given, said) = compare(&["--width", "64", "--cameras", "cameras.json"]);
+    assert!(given["psnr"] == by_beside["psnr"] && !said.contains("note:"), "{said}");
+    for other in [["--no-cameras", "--width=64"], ["--orbit=8", "--width=64"]] {
+        let (score, said) = compare(&other);
+        assert!(score["found_views"] == true && !said.contains("note:"), "{said}");
+    }
     let (used, said) = compress(&["--cameras", "cameras.json"]);
     assert!(used == true && !said.contains("note:"), "{said}");
     assert!(file() == found);
@@ -125,6 +139,8 @@ fn cameras_that_lie_beside_a_scene_are_used() {
     std::fs::write(folder.path("cameras.json"), cameras.to_string()).unwrap();
     let (used, said) = compress(&[]);
     assert!(used == false && said.contains("do not seem to belong"), "{said}");
+    let (score, said) = compare(&["--width", "64"]);
+    assert!(score["found_views"] == true && said.contains("do not seem to belong"), "{said}");
     let alone = file();
     let (_, said) = compress(&["--no-cameras"]);
     assert!(file() == alone && !said.contains("note:"), "{said}");

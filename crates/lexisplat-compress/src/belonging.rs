@@ -22,7 +22,7 @@ const LEAST_DETAIL: f64 = 1.15;
 ///
 /// # Errors
 /// As [`Renderer::render`]; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-pub(crate) fn belong(
+pub fn belong(
     renderer: &mut Renderer,
     splats: &Splats,
     cameras: &[Camera],

@@ -74,6 +74,7 @@ pub mod views;
 mod with_view;
 
 pub use beginning::{Compress, Source, compress};
+pub use belonging::belong;
 pub use decibels::decibels;
 pub use drawing::{DrawOptions, draw_views};
 pub use effort::Refine;

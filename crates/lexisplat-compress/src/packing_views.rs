@@ -10,7 +10,7 @@ use crate::backgrounds::black_and_white;
 use crate::error::{Error, Result};
 use crate::found::{Found, GENERATED_SIZE, ViewCounts, evenly, find};
 use crate::sharp_views::{sampled, sampled_again};
-use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints};
+use crate::views::{DEFAULT_MAX_WIDTH, Viewpoints, marked};
 
 /// Number of generated views that measure: [`GAUSSIANS_DRAWN`] over the number of Gaussians, within this range. Views of
 /// many Gaussians take long to draw.
@@ -264,9 +264,7 @@ impl PackingViews {
     /// # Errors
     /// [`Error::Parameter`] if fewer than two cameras remain.
     pub fn given(cameras: &[Camera]) -> Result<Self> {
-        let marked = cameras.iter().any(|c| c.split == Some(Split::Train));
-        let used: Vec<&Camera> =
-            cameras.iter().filter(|c| !marked || c.split == Some(Split::Train)).collect();
+        let used = marked(cameras, Split::Train);
         if used.len() < 2 {
             return Err(Error::parameter("cameras", used.len(), "at least two training cameras"));
         }

@@ -35,8 +35,11 @@ pub(crate) struct Render {
     pub(crate) views: Views,
 }
 
-/// Draw two scenes from the same cameras and score the second against the first. Without --cameras, --views object and
-/// --views room a search finds views like photographs, as sharp as the scene, as in `compress`.
+/// Draw two scenes from the same cameras and score the second against the first.
+///
+/// Without --cameras, --orbit and --views, cameras that lie beside A are used, if they seem to belong to the scene: the
+/// test cameras if some are marked, and at most 24. If there are none, a search finds views like photographs, as sharp
+/// as the scene, as in `compress`.
 #[derive(Debug, Args)]
 pub(crate) struct Compare {
     /// The original scene, of any format.
@@ -45,6 +48,9 @@ pub(crate) struct Compare {
     pub(crate) b: PathBuf,
     #[command(flatten)]
     pub(crate) views: Views,
+    /// Ignore cameras that lie beside A, one folder above it or where INRIA's trainer leaves them.
+    #[arg(long, conflicts_with = "cameras")]
+    pub(crate) no_cameras: bool,
     /// Round pictures to 8 bits before scoring, as in saved pictures.
     #[arg(long = "8bit")]
     pub(crate) eight_bit: bool,

@@ -26,9 +26,9 @@ pub(crate) struct Views {
     /// Viewpoints of generated views: around an `object`, or inside a `room`. `auto` chooses one of them by the scene.
     #[arg(long = "views", value_parser = viewpoints(), default_value = "auto")]
     pub(crate) viewpoints: Viewpoints,
-    /// Number of generated views, 1 to 65535.
-    #[arg(long, default_value_t = lexisplat_compress::DEFAULT_ORBIT, value_name = "N", value_parser = whole::<u16>(1..=65_535))]
-    pub(crate) orbit: u16,
+    /// Number of generated views, 1 to 65535 [default: 8].
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1..=65_535))]
+    pub(crate) orbit: Option<u16>,
     /// Largest width of a picture, 1 to 16384 pixels. Wider pictures are drawn smaller.
     #[arg(long, default_value_t = lexisplat_compress::DEFAULT_MAX_WIDTH, value_name = "PIXELS", value_parser = whole::<u32>(1..=16_384))]
     pub(crate) width: u32,
@@ -58,13 +58,18 @@ pub(crate) struct Photos {
 }
 
 impl Views {
+    /// Returns the number of generated views.
+    pub(crate) fn generated(&self) -> u16 {
+        self.orbit.unwrap_or(lexisplat_compress::DEFAULT_ORBIT)
+    }
+
     /// Returns the options in the form that the library takes.
     pub(crate) fn options(&self, photos: Option<&Photos>) -> ViewOptions {
         let mut options = ViewOptions::default();
         options.cameras.clone_from(&self.cameras);
         options.hold = self.hold;
         options.viewpoints = self.viewpoints;
-        options.count = self.orbit;
+        options.count = self.generated();
         options.max_width = self.width;
         options.near = self.near;
         if let Some(photos) = photos {

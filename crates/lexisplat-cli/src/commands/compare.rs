@@ -1,22 +1,27 @@
 //! `lexisplat compare`.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::{Model, Progress};
-use lexisplat_compress::{DrawOptions, Viewpoints, judging_views};
+use lexisplat::{Model, Progress, Splats};
+use lexisplat_compress::views::marked;
+use lexisplat_compress::{DrawOptions, Viewpoints, belong, judging_views, read_beside};
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, Loaded, SceneFile, Whereabouts, compare, format, montage, png};
-use lexisplat_render::{Camera, Renderer};
+use lexisplat_render::{Camera, Renderer, Split};
 use serde_json::json;
 
 use super::compress::record_line;
 use super::scores::ScoreTable;
 use crate::args::{Common, Compare, Views};
 use crate::device::open_renderer;
-use crate::files::{check_free, load, make_folder, tell, view_name, warn_of, write_bytes};
+use crate::files::{check_free, is_pipe, load, make_folder, note, tell, view_name, warn_of, write_bytes};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
+
+/// Most cameras beside a scene that pictures are compared from. Each takes as long as two pictures of the scene.
+const MOST_BESIDE: usize = 24;
 
 pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let (a, mut b) = (load(&args.a, common)?, load(&args.b, common)?);
@@ -27,10 +32,12 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let views = &args.views;
     let mut renderer = open_renderer(views.device)?;
     let bars = Bars::new(common.quiet);
-    let found = views.cameras.is_none() && views.viewpoints == Viewpoints::Auto;
-    let cameras = match found {
-        true => photographs(&a, views, &mut renderer, &bars)?,
-        false => super::cameras(views, &scene_a)?,
+    let beside = beside(args, &a, common, &mut renderer, &bars)?;
+    let found = beside.is_none() && views.cameras.is_none() && views.viewpoints == Viewpoints::Auto;
+    let cameras = match beside {
+        Some(cameras) => cameras,
+        None if found => photographs(&a, views, &mut renderer, &bars)?,
+        None => super::cameras(views, &scene_a)?,
     };
     let mut saved = Vec::new();
     if let Some(folder) = &args.save_views {
@@ -68,6 +75,42 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     tell(common, json, || table(&a, &b, &comparison, args, renderer.name()))
 }
 
+/// Returns the cameras that lie beside `a`, if a search for them is allowed and they seem to belong to the scene: the test cameras
+/// if the file marks them, and at most [`MOST_BESIDE`]. Says which they are.
+fn beside(
+    args: &Compare,
+    a: &SceneFile,
+    common: &Common,
+    renderer: &mut Renderer,
+    progress: &dyn Progress,
+) -> Result<Option<Vec<Camera>>> {
+    let views = &args.views;
+    let chosen = views.cameras.is_some() || views.viewpoints != Viewpoints::Auto || views.orbit.is_some();
+    if chosen || args.no_cameras || is_pipe(&args.a) {
+        return Ok(None);
+    }
+    let Some((path, set)) = read_beside(&args.a) else { return Ok(None) };
+    let cameras = set.relative_to(a.scene().meta().offset).cameras;
+    let used = belong(renderer, &splats(a), &cameras, progress)?;
+    let all = cameras.len();
+    let cameras = marked(&cameras, Split::Test);
+    let step = cameras.len().div_ceil(MOST_BESIDE).max(1);
+    let sharp = |camera: &Camera| camera.with_max_width(views.width).with_near(views.near);
+    let cameras: Vec<Camera> = cameras.into_iter().step_by(step).map(sharp).collect();
+    if !common.quiet {
+        let (some, path) = (cameras.len(), path.display());
+        note(&match used {
+            true => format!(
+                "note: drawn from {some} of the {all} cameras of {path}; --no-cameras looks for views from elsewhere too"
+            ),
+            false => format!(
+                "note: the cameras of {path} do not seem to belong to the scene and were not used; --cameras uses them all the same"
+            ),
+        });
+    }
+    Ok(used.then_some(cameras))
+}
+
 /// Returns views of `a` that are like photographs. Views of this kind judge the files of `compress`.
 fn photographs(
     a: &SceneFile,
@@ -75,15 +118,17 @@ fn photographs(
     renderer: &mut Renderer,
     progress: &dyn Progress,
 ) -> Result<Vec<Camera>> {
-    let count = usize::from(views.orbit);
-    let found = match &a.loaded {
-        Loaded::Ply(read) => judging_views(renderer, &read.splats, count, progress)?,
-        Loaded::Other(read) => judging_views(renderer, &read.splats, count, progress)?,
-        Loaded::Lexi(model, _) => {
-            judging_views(renderer, &Model::clone(model).into_splats(), count, progress)?
-        }
-    };
+    let found = judging_views(renderer, &splats(a), views.generated().into(), progress)?;
     Ok(found.iter().map(|camera| camera.with_max_width(views.width)).collect())
+}
+
+/// Returns the Gaussians of `file` with dense SH.
+fn splats(file: &SceneFile) -> Cow<'_, Splats> {
+    match &file.loaded {
+        Loaded::Ply(read) => Cow::Borrowed(&read.splats),
+        Loaded::Other(read) => Cow::Borrowed(&read.splats),
+        Loaded::Lexi(model, _) => Cow::Owned(Model::clone(model).into_splats()),
+    }
 }
 
 fn table(

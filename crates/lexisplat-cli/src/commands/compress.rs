@@ -12,13 +12,14 @@ use lexisplat::{
     CompressOptions, DEFAULT_TOLERANCE, Error, FileKind, FormatError, Joined, Layout, Limits, Record,
     SplatSource, lexi,
 };
+use lexisplat_compress::views::marked;
 use lexisplat_compress::{
     Compression, CompressionReport, Packing, Quality, RefineReport, SensitivitySource, Target, WithView,
     overshoot, read_beside, uncertain_by,
 };
 use lexisplat_eval::format;
 use lexisplat_formats::{Opened, open};
-use lexisplat_render::{ViewSet, read_views};
+use lexisplat_render::{Split, ViewSet, read_views};
 
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
@@ -120,7 +121,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         note(&match reached.cameras {
             true => format!(
                 "note: drawn and judged by the {} cameras of {}; --no-cameras ignores them",
-                set.cameras.len(),
+                marked(&set.cameras, Split::Train).len(),
                 path.display()
             ),
             false => format!(

@@ -12,7 +12,7 @@ pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
         files: args.files.clone(),
         cameras: views.cameras.clone(),
         split: views.split.unwrap_or_default(),
-        orbit: views.orbit,
+        orbit: views.generated(),
         max_width: views.width,
         near: views.near,
         background: views.background,

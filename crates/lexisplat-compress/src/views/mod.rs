@@ -19,7 +19,7 @@ use crate::signs::near_plane_hides;
 pub use beside::{cameras_beside, read_beside};
 use folder::PhotoFolder;
 pub use photo::photo;
-pub use split::{DEFAULT_HOLD, SplitFilter};
+pub use split::{DEFAULT_HOLD, SplitFilter, marked};
 
 /// Default of the largest width of a picture, in pixels, as in the field (INRIA `utils/camera_utils.py`).
 pub const DEFAULT_MAX_WIDTH: u32 = 1600;

@@ -72,6 +72,14 @@ pub(super) fn unmarked(cameras: Vec<Camera>, filter: SplitFilter) -> Result<Vec<
     Ok(cameras)
 }
 
+/// Returns the cameras that are marked as cameras of `split`, or all cameras if none is.
+#[must_use]
+pub fn marked(cameras: &[Camera], split: Split) -> Vec<&Camera> {
+    let wanted = |camera: &&Camera| camera.split == Some(split);
+    let any = cameras.iter().any(|camera| wanted(&camera));
+    cameras.iter().filter(|camera| !any || wanted(camera)).collect()
+}
+
 fn mark(cameras: &mut [Camera], hold: usize) {
     let mut sorted: Vec<&mut Camera> = cameras.iter_mut().collect();
     sorted.sort_by(|a, b| a.name.cmp(&b.name));
@@ -119,7 +127,10 @@ mod tests {
     #[test]
     fn marks_win() {
         let mut all = cameras(&["a", "b", "c"]);
+        assert_eq!(marked(&all, Split::Test).len(), 3);
         all[1].split = Some(Split::Test);
+        assert_eq!(marked(&all, Split::Test), [&all[1]]);
+        assert_eq!(marked(&all, Split::Train).len(), 3);
         assert_eq!(names(filter(all.clone(), SplitFilter::Test, 8).unwrap()), ["b"]);
         let message = filter(all.clone(), SplitFilter::Train, 8).unwrap_err().to_string();
         assert_eq!(message, "split = train: a split that some of the 3 cameras belong to");
