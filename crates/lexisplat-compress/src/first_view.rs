@@ -8,7 +8,7 @@ use lexisplat::{Geometry, Progress, SplatSource, Splats};
 use lexisplat_render::{Camera, Pose, RenderOptions, Renderer, Scene, levelled, object, subject, upward};
 
 use crate::error::Result;
-use crate::found::{BARE, GENERATED_SIZE, LEAST_LIT, SMALL, detail, enlarged, likely, lit, sketch};
+use crate::found::{BARE, GENERATED_SIZE, LEAST_LIT, SMALL, detail, likely, lit, sketch};
 use crate::observed_directions::ObservedDirections;
 use crate::photo_views::likelihood;
 use crate::size_spread::Sizes;
@@ -187,6 +187,14 @@ fn sampled(source: &dyn SplatSource) -> Result<Splats> {
         splats.append(run.clone());
     }
     Ok(splats)
+}
+
+/// Returns `splats` with each Gaussian so much larger that they cover what `times` as many cover.
+fn enlarged(mut splats: Splats, times: f64) -> Splats {
+    #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
+    let by = (0.5 * libm::log(times.max(1.0))) as f32;
+    splats.geometry.scales.iter_mut().flatten().for_each(|scale| *scale += by);
+    splats
 }
 
 /// Returns the value that the share `share`, below 1, of `values` does not reach; 0 without values.

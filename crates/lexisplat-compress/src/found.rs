@@ -27,9 +27,6 @@ const GAUSSIANS_DRAWN: usize = 128_000_000;
 pub(crate) const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Width and height of the small pictures, in pixels.
 pub(crate) const SMALL: [u32; 2] = [96, 64];
-/// Most Gaussians in the small pictures. Of a scene that has more some are drawn, larger. Room-large with its 399,711 Gaussians
-/// takes as many bytes at equal PSNR as if all were drawn (docs/METHOD.md, appendix, "Views like photographs").
-const MOST_SKETCHED: usize = 98_304;
 /// Smallest opacity in the small pictures, 5 %, before the sigmoid.
 const FAINT: f32 = -3.0;
 /// A pixel shows something if one of its channels is above this value.
@@ -74,7 +71,7 @@ pub(crate) fn find(
     let tried = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(*TRIED.start(), *TRIED.end());
     let (photo, mut others) = likely(splats, tried);
     others.extend(more);
-    let sketch = thinned(sketch(splats), MOST_SKETCHED);
+    let sketch = sketch(splats);
     let scene = renderer.prepare(Scene::from(&sketch))?;
     let mut seen = Vec::with_capacity(photo.len() + others.len());
     progress.begin(Stage::Draw, (photo.len() + others.len()) as u64);
@@ -187,26 +184,6 @@ pub(crate) fn sketch(splats: &Splats) -> Splats {
     sketch.gathered(&curve_order(&sketch.geometry))
 }
 
-/// Returns at most `most` of the Gaussians of a `sketch`, evenly chosen in their order and so much larger that they cover what
-/// all cover.
-fn thinned(mut sketch: Splats, most: usize) -> Splats {
-    let all = sketch.len();
-    if all <= most {
-        return sketch;
-    }
-    let keep: Vec<bool> = (0..all).map(|i| (i + 1) * most / all > i * most / all).collect();
-    sketch.retain(&keep);
-    enlarged(sketch, all as f64 / most as f64)
-}
-
-/// Returns `splats` with each Gaussian so much larger that they cover what `times` as many cover.
-pub(crate) fn enlarged(mut splats: Splats, times: f64) -> Splats {
-    #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-    let by = (0.5 * libm::log(times.max(1.0))) as f32;
-    splats.geometry.scales.iter_mut().flatten().for_each(|scale| *scale += by);
-    splats
-}
-
 /// Returns the share of the pixels that show something.
 pub(crate) fn lit(picture: &Image) -> f64 {
     let lit = picture.pixels.iter().filter(|pixel| pixel.iter().any(|value| *value > LIT)).count();
@@ -259,34 +236,6 @@ mod tests {
         let others = natural_views(&splats.geometry, 60, GENERATED_SIZE);
         assert!(mean_detail(&best) > 1.2 * mean_detail(&others));
         assert!(mean_detail(&judges) > 1.2 * mean_detail(&others));
-    }
-
-    #[test]
-    fn a_third_of_the_gaussians_show_what_all_show() {
-        let all = sketch(&scene(&SampleOptions::new(3000, 3)));
-        let some = thinned(all.clone(), all.len() / 3);
-        assert_eq!((some.len(), thinned(all.clone(), all.len())), (all.len() / 3, all.clone()));
-        let drawn = |splats: &Splats, view: &Camera| {
-            let small = view.resized(SMALL[0], SMALL[1]);
-            render(&Scene::from(splats), &small, &RenderOptions::default()).unwrap()
-        };
-        let views = surround(&all.geometry, 8, GENERATED_SIZE, [2.0, 12.0]);
-        // The mean absolute error of pictures, over their mean value.
-        let error = |splats: &Splats| {
-            let (mut error, mut sum) = (0.0, 0.0);
-            for view in &views {
-                let [of_all, own] = [&all, splats].map(|splats| drawn(splats, view).pixels);
-                for (a, b) in of_all.iter().flatten().zip(own.iter().flatten()) {
-                    error += f64::from((a - b).abs());
-                    sum += f64::from(*a);
-                }
-            }
-            error / sum
-        };
-        let mut smaller = all.clone();
-        smaller.retain(&(0..all.len()).map(|i| i % 3 == 2).collect::<Vec<_>>());
-        let [error, of_smaller] = [error(&some), error(&smaller)];
-        assert!(error < 0.2 && error < 0.7 * of_smaller, "{error} {of_smaller}");
     }
 
     #[test]
