@@ -12,7 +12,7 @@ use lexisplat_eval::{Comparison, Loaded, SceneFile, Whereabouts, compare, format
 use lexisplat_render::{Camera, Renderer, Split};
 use serde_json::json;
 
-use super::compress::record_line;
+use super::compress::{cameras_not_used, record_line};
 use super::scores::ScoreTable;
 use crate::args::{Common, Compare, Views};
 use crate::device::open_renderer;
@@ -98,14 +98,13 @@ fn beside(
     let sharp = |camera: &Camera| camera.with_max_width(views.width).with_near(views.near);
     let cameras: Vec<Camera> = cameras.into_iter().step_by(step).map(sharp).collect();
     if !common.quiet {
-        let (some, path) = (cameras.len(), path.display());
         note(&match used {
             true => format!(
-                "note: drawn from {some} of the {all} cameras of {path}; --no-cameras looks for views from elsewhere too"
+                "note: drawn from {} of the {all} cameras of {}; --no-cameras looks for views from elsewhere too",
+                cameras.len(),
+                path.display()
             ),
-            false => format!(
-                "note: the cameras of {path} do not seem to belong to the scene and were not used; --cameras uses them all the same"
-            ),
+            false => cameras_not_used(&path),
         });
     }
     Ok(used.then_some(cameras))

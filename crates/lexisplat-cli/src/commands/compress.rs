@@ -124,10 +124,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
                 marked(&set.cameras, Split::Train).len(),
                 path.display()
             ),
-            false => format!(
-                "note: the cameras of {} do not seem to belong to the scene and were not used; --cameras uses them all the same",
-                path.display()
-            ),
+            false => cameras_not_used(path),
         });
     }
     warn(&name, report.reached.as_ref().and_then(uncertain).as_slice());
@@ -146,6 +143,14 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let mut json = serde_json::to_value(&report)?;
     json["output"] = output.display().to_string().into();
     tell(common, json, || text(&report, &output, args.all))
+}
+
+/// Returns the note that the cameras of `path`, which lie beside a scene, were not used.
+pub(super) fn cameras_not_used(path: &Path) -> String {
+    format!(
+        "note: the cameras of {} do not seem to belong to the scene and were not used; --cameras uses them all the same",
+        path.display()
+    )
 }
 
 /// Returns the error for several inputs without an output. The last input may have been meant as the output.
