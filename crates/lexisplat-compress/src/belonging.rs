@@ -17,8 +17,8 @@ const DRAWN_WIDTH: u32 = 96;
 const LEAST_DETAIL: f64 = 1.15;
 
 /// Returns whether photographs of `splats` may have been taken by `cameras`. The pictures of most cameras must show
-/// something of the scene. Their median detail must be at least [`LEAST_DETAIL`] times that of [`natural_views`]. Cameras
-/// of another scene, or in other coordinates, fail.
+/// something of the scene, and their median detail must exceed that of [`natural_views`]. Cameras of another scene, or in
+/// other coordinates, fail.
 ///
 /// # Errors
 /// As [`Renderer::render`]; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
