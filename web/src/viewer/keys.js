@@ -36,6 +36,8 @@ export const HELP = [
 /** Listens to keys. */
 export class Keys {
   #held = new Set();
+  // Keys pressed since the last picture. A key that was released before it still flies one step.
+  #pressed = new Set();
   #fast = false;
   #last;
 
@@ -53,20 +55,23 @@ export class Keys {
       this.#held.delete(event.code);
       this.#fast = event.shiftKey;
     });
-    on(window, 'blur', () => this.#held.clear());
+    on(window, 'blur', () => {
+      this.#held.clear();
+      this.#pressed.clear();
+    });
   }
 
-  /** Flies by the keys that are held at the time `now`, in milliseconds; returns whether one is. */
+  /** Flies by the keys that were held or pressed until the time `now`, in milliseconds; returns whether one is held. */
   fly(now, act) {
     const sum = [0, 0, 0];
-    for (const code of this.#held) FLIGHT[code].forEach((step, axis) => (sum[axis] += step));
-    if (this.#held.size === 0) this.#last = undefined;
+    for (const code of new Set([...this.#held, ...this.#pressed])) FLIGHT[code].forEach((step, axis) => (sum[axis] += step));
+    this.#pressed.clear();
     const seconds = Math.min(LONGEST_STEP, Math.max(0, (now - (this.#last ?? now - 1000 / 60)) / 1000));
-    if (this.#held.size > 0) this.#last = now;
-    if (sum.every((step) => step === 0)) return this.#held.size > 0;
-    const by = seconds * SPEED * (this.#fast ? FAST : 1);
-    act((viewer) => viewer.fly(...sum.map((step) => step * by)));
-    return true;
+    const flies = this.#held.size > 0;
+    this.#last = flies ? now : undefined;
+    const steps = sum.map((step) => step * seconds * SPEED * (this.#fast ? FAST : 1));
+    if (steps.some((step) => step !== 0)) act((viewer) => viewer.fly(...steps));
+    return flies;
   }
 
   #press(event, stage, own, touched) {
@@ -75,6 +80,7 @@ export class Keys {
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     if (event.code in FLIGHT) {
       this.#held.add(event.code);
+      this.#pressed.add(event.code);
       stage.request();
     } else if (key in TURNS) stage.act((viewer) => viewer.run(`orbit=${TURNS[key].join(':')}`), true).catch(stage.on.failed);
     else if (own[key]) own[key]();
