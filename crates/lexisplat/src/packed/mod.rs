@@ -40,10 +40,6 @@ pub use encode::options::{LOD_FIRST_LAYER, PackOptions};
 #[cfg(feature = "encode")]
 pub use encode::pack::Packer;
 #[cfg(feature = "encode")]
-pub(crate) use encode::pack::expected_step;
-#[cfg(feature = "encode")]
-pub(crate) use encode::quantised::Observation;
-#[cfg(feature = "encode")]
 pub use encode::quantised::{Quantised, Refit, ToRefit};
 #[cfg(feature = "encode")]
 pub use encode::tiles;

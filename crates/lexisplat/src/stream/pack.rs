@@ -1,13 +1,13 @@
-//! Packing of scenes: as a whole if they have one bucket, otherwise bucket by bucket.
+//! Packing of scenes bucket by bucket, in one process.
 
-use super::observer::{Observed, Observer};
+use super::observer::Observer;
 use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
 use crate::packed::tiles::{
-    Assembly, BUCKET, Coded, Coding, Looked, PackedFile, Plan, SHOWN, Sample, Steps, Tables,
+    Assembly, BUCKET, Coded, Coding, Looked, PackedFile, Plan, Sample, Steps, Tables,
 };
-use crate::packed::{Observation, PackOptions, Packer, Refit, ToRefit, expected_step};
-use crate::scene::sensitivity::{Sensitivity, guessed_total};
+use crate::packed::{PackOptions, Packer, Refit, ToRefit};
+use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
@@ -18,9 +18,9 @@ use crate::support::stopwatch::Stopwatch;
 
 /// Packs the scene of `source` so that its pictures have a PSNR of about `decibels` dB, and writes it to `sink`.
 ///
-/// A scene of at most [`BUCKET`] Gaussians is packed as a whole, as by [`Packer`]. A larger scene is packed [bucket by
-/// bucket](crate::packed::tiles). `observer` draws each bucket, and steps, predictors and dictionary are found from sums
-/// over all buckets. Without an observer, the sensitivity is guessed from each Gaussian alone.
+/// A scene is packed [bucket by bucket](crate::packed::tiles). `observer` draws each bucket, and steps, predictors and dictionary
+/// are found from sums over all buckets. Without an observer, the sensitivity is guessed from each Gaussian alone. A scene of one
+/// bucket has the bytes that [`Packer`] gives it, if all its rows were surveyed (scenes of less than 131,072 Gaussians).
 ///
 /// The bytes are the same on any number of threads. They are also those that other processes make of the same tiles, which
 /// are the [parts](SplatSource::tiles) of `source`. Peak of anonymous memory is below 1.5 GiB at SH degree 3.
@@ -43,7 +43,7 @@ pub fn pack<'a, E: From<Error>>(
 /// Packs as [`pack`] does, with buckets of about `bucket` Gaussians.
 pub(crate) fn run<E: From<Error>>(
     source: &dyn SplatSource,
-    observer: Option<&mut dyn Observer<E>>,
+    mut observer: Option<&mut dyn Observer<E>>,
     options: &PackOptions,
     decibels: f64,
     sink: Sink<'_>,
@@ -52,61 +52,9 @@ pub(crate) fn run<E: From<Error>>(
 ) -> Result<PackedFile, E> {
     Limits::check("Gaussians", source.len() as u64, MAX_GAUSSIANS)?;
     options.check()?;
-    match source.len() <= bucket {
-        true => whole(source, observer, options, decibels, sink, progress),
-        false => in_buckets(source, observer, options, decibels, sink, bucket, progress),
+    if source.is_empty() {
+        return Ok(without_gaussians(source, options, sink, progress)?);
     }
-}
-
-fn whole<E: From<Error>>(
-    source: &dyn SplatSource,
-    mut observer: Option<&mut dyn Observer<E>>,
-    options: &PackOptions,
-    decibels: f64,
-    sink: Sink<'_>,
-    progress: &dyn Progress,
-) -> Result<PackedFile, E> {
-    let splats = source.whole()?;
-    progress.begin(Stage::Look, splats.len() as u64);
-    let observed = match &mut observer {
-        Some(observer) => observer.observe(&splats)?,
-        None => {
-            let total = guessed_total(0.0, &splats.geometry) / SHOWN;
-            Sensitivity::guess_of_part(&splats.geometry, total).into()
-        }
-    };
-    progress.advance(splats.len() as u64);
-    progress.end();
-    observed.check(&splats, options)?;
-    let Observed { instead, sensitivity, step_factor, memo } = observed;
-    let part = splats.as_ref();
-    let packer = Packer::new(instead.as_ref().unwrap_or(part), &sensitivity, options)?;
-    drop(sensitivity);
-    let step = step_factor * expected_step(part.len(), decibels);
-    let mut quantised = packer.quantise(step, true, progress)?;
-    let device = observer.as_ref().and_then(|observer| observer.device());
-    let mut refit = observer.map(|observer| |of: ToRefit<'_, '_>| observer.refit(of));
-    let refit = refit.as_mut().map(|refit| refit as &mut Refit<'_, E>);
-    let observation = Observation { part, step, scale: 1.0, memo: &memo };
-    let appearances = quantised.refitted(refit, &observation, progress)?;
-    let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
-    let removed = part.len().saturating_sub(packed.len()) as u64;
-    let packed = packed.with_device(device).with_removed(removed);
-    let writer = LexiWriter::packed(&packed);
-    let tensor_bytes = writer.tensor_bytes().to_vec();
-    writer.write(sink, progress)?;
-    Ok(PackedFile { head: packed.head().clone(), report, tensor_bytes })
-}
-
-fn in_buckets<E: From<Error>>(
-    source: &dyn SplatSource,
-    mut observer: Option<&mut dyn Observer<E>>,
-    options: &PackOptions,
-    decibels: f64,
-    sink: Sink<'_>,
-    bucket: usize,
-    progress: &dyn Progress,
-) -> Result<PackedFile, E> {
     let clock = Stopwatch::start();
     let folder = sink.spill_folder()?;
     let to = SpillTo::Folder(&folder);
@@ -171,6 +119,21 @@ fn in_buckets<E: From<Error>>(
     done.report.learn_seconds = learn_seconds;
     done.report.code_seconds = clock.seconds() - before - learn_seconds;
     Ok(done)
+}
+
+/// Packs a scene without Gaussians, which has no buckets.
+fn without_gaussians(
+    source: &dyn SplatSource,
+    options: &PackOptions,
+    sink: Sink<'_>,
+    progress: &dyn Progress,
+) -> Result<PackedFile> {
+    let packer = Packer::new(source.whole()?, &Sensitivity::default(), options)?;
+    let (packed, report) = packer.pack(1.0, progress)?;
+    let writer = LexiWriter::packed(&packed);
+    let tensor_bytes = writer.tensor_bytes().to_vec();
+    writer.write(sink, progress)?;
+    Ok(PackedFile { head: packed.head().clone(), report, tensor_bytes })
 }
 
 /// One message of each bucket, in a temporary file.

@@ -18,7 +18,6 @@ use crate::sparse::learn::unit_axis;
 use crate::sparse::tally::Tally;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
-use crate::support::rng::SplitMix64;
 
 /// Largest number of rows that a dictionary is learned from.
 pub(in crate::packed) const SAMPLE: usize = 24_576;
@@ -120,27 +119,6 @@ pub(in crate::packed) struct ChunkCoder {
 }
 
 impl ChunkCoder {
-    /// Learns a coder from `gaussians`, which are a whole scene. Returns the atoms too.
-    pub(in crate::packed) fn new(
-        gaussians: OrderedGaussians<'_>,
-        mut parameters: Parameters,
-        points_of_view: PointsOfView,
-        options: &PackOptions,
-        progress: &dyn Progress,
-    ) -> Result<(Self, WholeAtoms)> {
-        let stop = promise(&mut parameters, options.tolerance);
-        if !parameters.are_usable() {
-            return Err(too_large());
-        }
-        let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(gaussians.len()).take(SAMPLE);
-        let (rows, classes) = gaussians.scaled(sample, &parameters.for_learning());
-        let learning = Learning { degree: gaussians.splats.degree, total: gaussians.len(), stop, options };
-        let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
-        parameters.factors[VALUES] *= step;
-        let coder = Self::learned(parameters, points_of_view, &atoms, costs, stop, options.tolerance)?;
-        Ok((coder, atoms))
-    }
-
     /// Creates a coder of learned `atoms`. `costs` are the costs of symbols.
     pub(in crate::packed) fn learned(
         parameters: Parameters,

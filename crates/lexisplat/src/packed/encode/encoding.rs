@@ -169,11 +169,6 @@ impl Encoding {
         Self { coder, layering, head, form, counts, learn_seconds: clock.seconds(), clock }
     }
 
-    /// Counts all time up to this call as time spent on learning.
-    pub(in crate::packed) fn end_learning(&mut self) {
-        self.learn_seconds = self.clock.seconds();
-    }
-
     /// Codes all chunks. All chunks of the `gaussians` Gaussians must be counted.
     pub(in crate::packed) fn finish(
         self,

@@ -1,4 +1,4 @@
-//! Steps and predictors, fitted to a scene.
+//! Steps and predictors, fitted to sums over a scene.
 
 use serde::{Deserialize, Serialize};
 
@@ -42,57 +42,59 @@ const RIDGE_GROWTH: f64 = 4.0;
 /// Largest slope of the logarithm of a step. Files hold slopes below 8.
 const MOST_SLOPE: f64 = 7.9;
 
-/// The fit of a scene: everything but the overall step.
-#[derive(Debug, Clone)]
-pub(in crate::packed) struct Fit {
-    pub(in crate::packed) steps: Steps,
-    /// The classes of each Gaussian, before rounding.
-    pub(in crate::packed) classes: Vec<ColourAndShape<f32>>,
+/// Sums over the Gaussians of a scene from which its steps follow.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(in crate::packed) struct StepSums {
+    /// Histogram of the sensitivities to the colour.
+    colour: Histogram,
+    /// Histogram of the sensitivities to the logarithm of the opacity.
+    opacity: Histogram,
+    colours: ColourMoments,
+    derivatives: Derivatives,
 }
 
-/// The steps and predictors of a scene, relative to the overall step.
+impl StepSums {
+    /// Adds the Gaussians of `keys`. `dc` has the base colours of `geometry`, and `own` the rounded sensitivities in the order of
+    /// `keys`.
+    pub(in crate::packed) fn add(
+        &mut self,
+        geometry: &Geometry,
+        dc: &[Vec3],
+        sensitivity: &Sensitivity,
+        keys: &[MortonKey],
+        own: impl Iterator<Item = AppearanceSensitivity>,
+    ) {
+        for AppearanceSensitivity { colour, opacity } in own {
+            self.colour.add(colour);
+            self.opacity.add(opacity);
+        }
+        self.colours.add(keys.iter().map(|g| dc[g.index()]));
+        self.derivatives.add(geometry, sensitivity, keys);
+    }
+
+    /// Adds the sums `other` of other Gaussians.
+    pub(in crate::packed) fn merge(&mut self, other: &Self) {
+        self.colour.merge(&other.colour);
+        self.opacity.merge(&other.opacity);
+        self.colours.merge(&other.colours);
+        self.derivatives.merge(&other.derivatives);
+    }
+}
+
+/// The steps of a scene without predictors, relative to the overall step.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::packed) struct Steps {
     pub(in crate::packed) parameters: Parameters,
     classes: ColourAndShape<Classes>,
 }
 
-impl Fit {
-    /// Fits steps and predictors. `keys` is the order in which the Gaussians of `geometry` are coded, and `dc` their base
-    /// colours.
-    pub(in crate::packed) fn new(
-        geometry: &Geometry,
-        dc: &[Vec3],
-        sensitivity: &Sensitivity,
-        keys: &[MortonKey],
-        grid: &Grid,
-    ) -> Self {
-        let sensitivities: Vec<AppearanceSensitivity> =
-            keys.iter().map(|g| sensitivity.appearance(g.index())).collect();
-        let classes = ColourAndShape {
-            colour: Classes::fit(sensitivities.iter().map(|s| s.colour)),
-            shape: Classes::fit(sensitivities.iter().map(|s| s.opacity)),
-        };
-        let mut derivatives = Derivatives::default();
-        derivatives.add(geometry, sensitivity, keys);
-        let mut steps = Steps::new(grid, classes, colour_axes(dc, keys), &derivatives);
-        let classes = steps.classes_of(&sensitivities);
-        let mut predictors = Predictors::default();
-        predictors.add(geometry, dc, keys, &classes, &steps.parameters);
-        predictors.solve(&mut steps.parameters);
-        Self { steps, classes }
-    }
-}
-
 impl Steps {
-    /// Creates steps without predictors.
-    pub(in crate::packed) fn new(
-        grid: &Grid,
-        classes: ColourAndShape<Classes>,
-        (dc_mean, dc_axes): (Vec3, [Vec3; 3]),
-        derivatives: &Derivatives,
-    ) -> Self {
-        let [scale_rows, rotation, position] = derivatives.rows();
+    /// Returns the steps of a scene with these `sums`.
+    pub(in crate::packed) fn new(grid: &Grid, sums: &StepSums) -> Self {
+        let classes =
+            ColourAndShape { colour: Classes::fit(&sums.colour), shape: Classes::fit(&sums.opacity) };
+        let (dc_mean, dc_axes) = sums.colours.axes();
+        let [scale_rows, rotation, position] = sums.derivatives.rows();
         let parameters = Parameters {
             origin: grid.origin,
             cell: grid.cell,
@@ -148,7 +150,7 @@ fn quantile(values: &[f64], share: f64) -> f64 {
 
 /// The classes of steps of a scene. A class has the step `2^class / 2^top`, which is about `1 / sqrt(sensitivity)`.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub(in crate::packed) struct Classes {
+struct Classes {
     /// Added to every sensitivity before its logarithm is taken.
     floor: f64,
     /// Half the binary logarithm of the sensitivity of class 0, a whole number.
@@ -156,20 +158,9 @@ pub(in crate::packed) struct Classes {
 }
 
 impl Classes {
-    /// Fits classes to a list of sensitivities.
-    fn fit(sensitivities: impl Iterator<Item = f32>) -> Self {
-        let mut sorted: Vec<f64> = sensitivities.map(f64::from).collect();
-        sorted.sort_by(f64::total_cmp);
-        Self::of_quantiles(|share| at_share(&sorted, share))
-    }
-
     /// Fits classes to a histogram of sensitivities.
-    pub(in crate::packed) fn of_histogram(sensitivities: &Histogram) -> Self {
-        Self::of_quantiles(|share| sensitivities.quantile(share).into())
-    }
-
-    /// Fits classes to sensitivities with these quantiles.
-    fn of_quantiles(quantile: impl Fn(f64) -> f64) -> Self {
+    fn fit(sensitivities: &Histogram) -> Self {
+        let quantile = |share| f64::from(sensitivities.quantile(share));
         let floor = (quantile(FLOOR_QUANTILE) * SENSITIVITY_FLOOR).max(1e-30);
         let top = 0.5 * libm::log2(quantile(TOP_QUANTILE) + floor);
         Self { floor, top: top.round() }
@@ -193,16 +184,6 @@ pub(in crate::packed) fn rounded(class: f32) -> u8 {
     class
 }
 
-/// Returns the mean base colour and the principal axes of base colours, strongest first.
-fn colour_axes(dc: &[Vec3], keys: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
-    let dc = || keys.iter().map(|g| dc[g.index()]);
-    let n = keys.len().max(1) as f64;
-    let mean: Vec3 = std::array::from_fn(|c| single(dc().map(|dc| f64::from(dc[c])).sum::<f64>() / n));
-    let deviations: Vec<f32> =
-        dc().flat_map(|dc| std::array::from_fn::<f32, 3, _>(|c| dc[c] - mean[c])).collect();
-    (mean, rounded_of(&crate::sparse::learn::principal_axes(3, &deviations)))
-}
-
 /// Rounds axes to those that a file holds.
 fn rounded_of(axes: &[Vec<f64>]) -> [Vec3; 3] {
     let mut out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -214,16 +195,16 @@ fn rounded_of(axes: &[Vec<f64>]) -> [Vec3; 3] {
 
 /// Sums of base colours and of products of their channels.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(in crate::packed) struct ColourMoments {
+struct ColourMoments {
     count: u64,
     sums: [f64; 3],
     products: [[f64; 3]; 3],
 }
 
 impl ColourMoments {
-    pub(in crate::packed) fn add(&mut self, dc: &[Vec3]) {
-        self.count += dc.len() as u64;
-        for dc in dc.iter().map(|dc| dc.map(f64::from)) {
+    fn add(&mut self, dc: impl Iterator<Item = Vec3>) {
+        for dc in dc.map(|dc| dc.map(f64::from)) {
+            self.count += 1;
             for i in 0..3 {
                 self.sums[i] += dc[i];
                 for j in 0..3 {
@@ -234,7 +215,7 @@ impl ColourMoments {
     }
 
     /// Adds the sums `other` of other Gaussians.
-    pub(in crate::packed) fn merge(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         self.count += other.count;
         for i in 0..3 {
             self.sums[i] += other.sums[i];
@@ -245,7 +226,7 @@ impl ColourMoments {
     }
 
     /// Returns the mean base colour and the principal axes of base colours, strongest first.
-    pub(in crate::packed) fn axes(&self) -> (Vec3, [Vec3; 3]) {
+    fn axes(&self) -> (Vec3, [Vec3; 3]) {
         let n = self.count.max(1) as f64;
         let mean = self.sums.map(|sum| sum / n);
         let about = |i: usize, j: usize| self.products[i][j] - self.sums[i] * mean[j];
@@ -257,7 +238,7 @@ impl ColourMoments {
 /// Fits of the binary logarithm of steps, relative to the step of the opacity: for scaling, turning and moving, along each
 /// axis. The logarithm is linear in 1 and the three scales. For scaling it is constant.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in crate::packed) struct Derivatives([[Equations<4>; 3]; 3]);
+struct Derivatives([[Equations<4>; 3]; 3]);
 
 impl Default for Derivatives {
     fn default() -> Self {
@@ -267,12 +248,7 @@ impl Default for Derivatives {
 
 impl Derivatives {
     /// Adds the Gaussians of `keys`. Gaussians with the smallest sensitivities do not count.
-    pub(in crate::packed) fn add(
-        &mut self,
-        geometry: &Geometry,
-        sensitivity: &Sensitivity,
-        keys: &[MortonKey],
-    ) {
+    fn add(&mut self, geometry: &Geometry, sensitivity: &Sensitivity, keys: &[MortonKey]) {
         let by_opacities: Vec<f64> = sensitivity.opacity.iter().map(|&s| f64::from(s)).collect();
         let least = quantile(&by_opacities, FIT_QUANTILE).max(1e-30);
         for placed in keys.iter().filter(|g| by_opacities[g.index()] > least) {
@@ -296,7 +272,7 @@ impl Derivatives {
     }
 
     /// Adds the sums `other` of other Gaussians.
-    pub(in crate::packed) fn merge(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         let own = self.0.as_flattened_mut().iter_mut();
         own.zip(other.0.as_flattened()).for_each(|(sum, more)| sum.merge(more));
     }

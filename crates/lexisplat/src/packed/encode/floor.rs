@@ -50,15 +50,8 @@ impl Floor {
         Self { parameters, added: ColourAndShape::default(), limited: false }
     }
 
-    /// Makes the steps of class 0 of `parameters` small enough for all Gaussians of `keys`. Also shifts the steps so that
-    /// those of some class are exactly the limits of colours and logarithms.
-    pub(in crate::packed) fn new(parameters: Parameters, geometry: &Geometry, keys: &[MortonKey]) -> Self {
-        let floor = Self::begin(parameters);
-        let over = floor.over(geometry, keys);
-        floor.within(over)
-    }
-
-    /// Sets the limits of colours and of logarithms, which do not depend on the shapes of Gaussians.
+    /// Sets the limits of colours and of logarithms, which do not depend on the shapes of Gaussians. Also shifts the steps so that
+    /// those of some class are exactly these limits.
     pub(in crate::packed) fn begin(mut parameters: Parameters) -> Self {
         // If a limit were between two classes, all Gaussians at it would change their steps at once as the overall step
         // grows.
@@ -71,6 +64,9 @@ impl Floor {
     /// Returns by how many octaves the steps of shape class 0 are too large for the Gaussians of `keys`; 0 if they are
     /// not. For several parts of a scene, the largest of their numbers counts.
     pub(in crate::packed) fn over(&self, geometry: &Geometry, keys: &[MortonKey]) -> f32 {
+        if !self.limited {
+            return 0.0;
+        }
         let tasks = map_chunks(keys.len(), GAUSSIANS_PER_TASK, |range| {
             let coarsest = keys[range].iter().map(|&g| coarsest(&self.parameters, geometry, g).shape);
             coarsest.fold(0.0, f32::min)

@@ -15,5 +15,7 @@ pub(in crate::packed) mod options;
 pub(in crate::packed) mod pack;
 pub(in crate::packed) mod quantised;
 pub(in crate::packed) mod removal;
+pub(in crate::packed) mod sample_sums;
+pub(in crate::packed) mod settled;
 pub mod tiles;
 pub(in crate::packed) mod transcribe;

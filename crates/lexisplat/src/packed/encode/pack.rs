@@ -2,13 +2,14 @@
 
 use std::borrow::Borrow;
 
-use super::fit::Fit;
-use super::floor::Floor;
+use super::coder::SAMPLE;
+use super::fit::{StepSums, Steps};
 use super::options::PackOptions;
-use super::quantised::{Fitted, Gaussians, Quantised};
+use super::quantised::Quantised;
 use super::removal::Influence;
+use super::sample_sums::SampleSums;
+use super::settled::{Begun, Settled};
 use crate::packed::bitstream::PointsOfView;
-use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::curve::{Grid, MortonKey};
 use crate::packed::scene::Packed;
 use crate::scene::sensitivity::Sensitivity;
@@ -16,8 +17,8 @@ use crate::scene::splats::{Splats, all_finite};
 use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
-use crate::support::maths::at_share;
-use crate::support::progress::Progress;
+use crate::support::progress::{Progress, Stage};
+use crate::support::stopwatch::Stopwatch;
 
 /// Expected PSNR in dB at an overall step of `EXPECTED_STEP / sqrt(gaussians)`. This constant and the next three are fitted
 /// to held-out views of the models in docs/results, which they miss by up to 3 dB.
@@ -35,10 +36,9 @@ pub struct Packer<S> {
     splats: S,
     options: PackOptions,
     keys: Vec<MortonKey>,
-    fit: Fit,
-    points_of_view: PointsOfView,
-    /// The base colours that the file holds, by index in `splats`.
-    dc: Vec<[f32; 3]>,
+    steps: Steps,
+    /// The sums that do not depend on the overall step.
+    sample: SampleSums,
     influence: Influence,
 }
 
@@ -55,11 +55,15 @@ impl<S: Borrow<Splats>> Packer<S> {
         let grid = Grid::fit(&g.positions);
         let mut keys = grid.keys(g);
         keys.sort_unstable();
-        let points_of_view = PointsOfView::new(&options.points_of_view);
-        let dc = points_of_view.colours(splats.borrow());
-        let fit = Fit::new(g, &dc, sensitivity, &keys, &grid);
         let influence = Influence::new(g, sensitivity, &keys, options.may_change());
-        Ok(Self { splats, options: options.clone(), keys, fit, points_of_view, dc, influence })
+        let dc = PointsOfView::new(&options.points_of_view).colours(splats.borrow());
+        let own = &influence.sensitivities;
+        let mut sums = StepSums::default();
+        sums.add(g, &dc, sensitivity, &keys, own.iter().copied());
+        let steps = Steps::new(&grid, &sums);
+        let mut sample = SampleSums::default();
+        sample.add_values(g, &dc, &keys, own, &steps);
+        Ok(Self { splats, options: options.clone(), keys, steps, sample, influence })
     }
 
     /// Returns the number of Gaussians.
@@ -106,36 +110,26 @@ impl<S: Borrow<Splats>> Packer<S> {
         if !step.is_finite() || step <= 0.0 {
             return Err(Error::parameter("step", step, "a finite number above 0"));
         }
-        let parameters = self.fit.steps.with_step(step);
-        let kept = self.influence.kept(step);
+        let clock = Stopwatch::start();
+        let Self { options, steps, influence, .. } = self;
+        let splats = self.splats.borrow();
+        let kept = influence.kept(step);
         let keys: Vec<MortonKey> = kept.iter().map(|&i| self.keys[i]).collect();
-        let classes: Vec<_> = kept.iter().map(|&i| self.fit.classes[i]).collect();
-        let sensitivities = kept.iter().map(|&i| self.influence.sensitivities[i]).collect();
-        let geometry = &self.splats.borrow().geometry;
-        let floor = match floor {
-            true => Floor::new(parameters, geometry, &keys),
-            false => Floor::none(parameters),
-        };
-        let classes = floor.classes(&classes, geometry, &keys);
-        let gaussians = Gaussians { keys, classes, sensitivities };
-        let fitted = Fitted {
-            most_dc: most_dc(&floor.parameters, &self.dc),
-            points_of_view: self.points_of_view.clone(),
-        };
-        Quantised::new(self.splats.borrow(), &self.options, gaussians, floor.parameters, fitted, progress)
+        let sensitivities: Vec<_> = kept.iter().map(|&i| influence.sensitivities[i]).collect();
+        drop(kept);
+        let energies = sensitivities.iter().map(|s| (s.opacity, 1));
+        let begun = Begun::new(steps, (step, floor), options, keys.len(), energies);
+        let mut sample = self.sample.clone();
+        sample.add_kept(splats, &keys, &sensitivities, (steps, &begun), (SAMPLE, options.seed));
+        let settled = Settled::new(begun, &sample, (splats.degree, keys.len()), options, progress)?;
+        drop(sample);
+        progress.check()?;
+        progress.begin(Stage::Code, keys.len() as u64);
+        let gaussians = (keys, sensitivities);
+        let quantised = settled.quantise(splats, gaussians, steps, options, clock, progress)?;
+        progress.end();
+        Ok(quantised)
     }
-}
-
-/// Share of the Gaussians whose base colours set the unit of base colours. The rest are too few to make all others coarse.
-pub(in crate::packed) const USUAL_DC: f64 = 0.999;
-
-/// Returns the quantile [`USUAL_DC`] of the largest coordinates of the base colours.
-pub(in crate::packed) fn most_dc(parameters: &Parameters, dc: &[[f32; 3]]) -> f64 {
-    let largest =
-        |&dc: &[f32; 3]| parameters.dc_coordinates(dc).into_iter().fold(0.0_f32, |most, x| most.max(x.abs()));
-    let mut all: Vec<f32> = dc.iter().map(largest).collect();
-    all.sort_by(f32::total_cmp);
-    f64::from(at_share(&all, USUAL_DC))
 }
 
 /// Returns [`Packer::step_for`] of a scene of `gaussians` Gaussians.

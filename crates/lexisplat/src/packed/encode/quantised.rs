@@ -5,14 +5,14 @@ use std::ops::Range;
 
 use super::appearance::{Appearance, AppearanceChange};
 use super::codebook::Codes;
-use super::coder::{ChunkCoder, OrderedGaussians, too_large};
+use super::coder::{OrderedGaussians, too_large};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written};
 use super::interim::InterimChanges;
 use super::layering::Layering;
 use super::options::PackOptions;
+use crate::packed::bitstream::CodedChunk;
 use crate::packed::bitstream::coded_gaussian::CodedGaussian;
-use crate::packed::bitstream::parameters::{ColourAndShape, Parameters};
-use crate::packed::bitstream::{CodedChunk, PointsOfView};
+use crate::packed::bitstream::parameters::ColourAndShape;
 use crate::packed::curve::MortonKey;
 use crate::packed::decode::reorder::gather;
 use crate::packed::entropy::tables::Tables;
@@ -26,7 +26,6 @@ use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::{Progress, Stage};
 use crate::support::spill::SpillTo;
-use crate::support::stopwatch::Stopwatch;
 
 /// A function that fits a part of a scene, as the file has it, to pictures of the part. It may replace SH-rest
 /// ([`Quantised::set_sh_rest`]). It returns one appearance for each Gaussian of the file, or `None` to leave them as they are.
@@ -98,14 +97,6 @@ impl Gaussians {
     }
 }
 
-/// Facts about the base colours of a scene that are known before it is coded.
-#[derive(Debug)]
-pub(in crate::packed) struct Fitted {
-    /// The largest coordinate of usual base colours.
-    pub(in crate::packed) most_dc: f64,
-    pub(in crate::packed) points_of_view: PointsOfView,
-}
-
 /// A chunk of a file.
 #[derive(Debug, Clone)]
 struct ChunkRows {
@@ -131,30 +122,9 @@ pub struct Quantised<'a> {
 }
 
 impl<'a> Quantised<'a> {
+    /// Quantises a scene or a part of one. `encoding` has everything with which all parts are coded. Advances `progress` by the
+    /// number of Gaussians.
     pub(in crate::packed) fn new(
-        splats: &'a Splats,
-        options: &'a PackOptions,
-        gaussians: Gaussians,
-        parameters: Parameters,
-        Fitted { most_dc, points_of_view }: Fitted,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let n = gaussians.keys.len();
-        let layering = Layering::new(n, options, gaussians.sensitivities.iter().map(|s| (s.opacity, 1)));
-        let ordered = OrderedGaussians::new(splats, &gaussians.keys, &gaussians.classes);
-        let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(ordered, parameters, points_of_view, options, progress)?;
-        let encoding = Encoding::new(coder, layering, most_dc, clock);
-        progress.check()?;
-        progress.begin(Stage::Code, n as u64);
-        let mut whole = Self::of_part(splats, options, gaussians, encoding, progress)?;
-        progress.end();
-        whole.encoding.end_learning();
-        Ok(whole)
-    }
-
-    /// Quantises a part of a scene. `encoding` has everything with which all parts are coded.
-    pub(in crate::packed) fn of_part(
         splats: &'a Splats,
         options: &'a PackOptions,
         mut gaussians: Gaussians,

@@ -1,5 +1,6 @@
 //! The choice of the Gaussians that a packed file leaves out.
 
+use super::octaves::RoundedSensitivities;
 use crate::packed::curve::MortonKey;
 use crate::scene::sensitivity::{AppearanceSensitivity, Sensitivity};
 use crate::scene::splats::Geometry;
@@ -59,7 +60,7 @@ pub(in crate::packed) fn is_worth_its_bits(change: f32, step: f64) -> bool {
 /// The dependence of pictures on each Gaussian as a whole.
 #[derive(Debug)]
 pub(in crate::packed) struct Influence {
-    /// The sensitivity to the appearance of each Gaussian.
+    /// The sensitivity to the appearance of each Gaussian, rounded as for scenes in parts.
     pub(in crate::packed) sensitivities: Vec<AppearanceSensitivity>,
     /// The result of [`changes_without`] for each Gaussian.
     left_out: Vec<f32>,
@@ -75,8 +76,9 @@ impl Influence {
         may_change: bool,
     ) -> Self {
         let left_out = changes_without(geometry, sensitivity, may_change);
+        let own: Vec<_> = keys.iter().map(|g| sensitivity.appearance(g.index())).collect();
         Self {
-            sensitivities: keys.iter().map(|g| sensitivity.appearance(g.index())).collect(),
+            sensitivities: RoundedSensitivities::of(&own).iter().collect(),
             left_out: keys.iter().map(|g| left_out[g.index()]).collect(),
         }
     }

@@ -1,7 +1,10 @@
 //! Packing of scenes that are read a part at a time, with buckets of any size.
 
 use super::*;
+use crate::packed::tiles::SHOWN;
 use crate::packed::{Appearance, MOST_CHUNK};
+use crate::scene::sensitivity::guessed_total;
+use crate::stream::Observed;
 use crate::{Extra, ExtraValues, Model, Silent, Splats, lexi, ply};
 
 fn scene(count: usize) -> Splats {
@@ -72,7 +75,7 @@ fn streamed_with(
     done.map(|done| (std::fs::read(output).unwrap(), done))
 }
 
-/// If all Gaussians are in one bucket and in the sample, no step can find other values than the packer.
+/// If all Gaussians are in one bucket and were surveyed, no step can find other values than the packer.
 #[test]
 fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
     for count in [MOST_CHUNK + 500, 700, 0] {

@@ -81,7 +81,7 @@ impl<'a> Assembly<'a> {
                 extras: SpilledExtras::new(to, plan.empty().geometry)?,
             })
         };
-        let layers = (0..coding.steps.layering.layers()).map(layer).collect::<Result<_>>()?;
+        let layers = (0..coding.steps.begun.layering.layers()).map(layer).collect::<Result<_>>()?;
         Ok(Self { plan, coding, tables, file, next: own.start, ranges: Ranges::new(to)?, layers })
     }
 

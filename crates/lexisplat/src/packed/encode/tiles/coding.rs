@@ -8,14 +8,10 @@ use super::message::messages;
 use super::plan::Plan;
 use super::sample::SampleStatistics;
 use super::steps::Steps;
-use crate::packed::bitstream::{PointsOfView, WholeAtoms};
 use crate::packed::curve::MortonKey;
-use crate::packed::encode::codebook::{Choice, Costs};
-use crate::packed::encode::coder::{ChunkCoder, Learning, VALUES, too_large};
 use crate::packed::encode::encoding::{self, Encoding, Written};
-use crate::packed::encode::floor::Floor;
-use crate::packed::encode::pack::USUAL_DC;
-use crate::packed::encode::quantised::{Gaussians, Quantised, Refit};
+use crate::packed::encode::quantised::Refit;
+use crate::packed::encode::settled::Settled;
 use crate::packed::entropy::tables;
 use crate::packed::entropy::tables::Lookup;
 use crate::scene::extra::Extra;
@@ -30,13 +26,7 @@ use crate::support::stopwatch::Stopwatch;
 pub struct Coding {
     plan_id: u32,
     pub(super) steps: Steps,
-    floor: Floor,
-    most_dc: f64,
-    atoms: WholeAtoms,
-    /// The costs of symbols.
-    costs: Costs,
-    /// The step of values, as a share of the usual step.
-    value_step: f32,
+    settled: Settled,
 }
 
 /// The coded Gaussians of a bucket.
@@ -90,17 +80,9 @@ impl Coding {
     ) -> Result<Self> {
         plan.check("steps", [steps.plan_id], None)?;
         let all = SampleStatistics::sum(plan, groups)?;
-        let mut floor = steps.floor.clone().within(all.over);
-        all.predictors.solve(&mut floor.parameters);
-        if !floor.parameters.are_usable() {
-            return Err(too_large());
-        }
-        let (rows, classes) = all.shuffled(plan);
-        let (degree, stop) = (plan.kind.degree, steps.stop);
-        let learning = Learning { degree, total: steps.kept(), stop, options: &plan.options };
-        let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
-        let most_dc = f64::from(all.dc.quantile(USUAL_DC));
-        Ok(Self { plan_id: plan.id(), steps: steps.clone(), floor, most_dc, atoms, costs, value_step: step })
+        let of = (plan.kind.degree, steps.kept());
+        let settled = Settled::new(steps.begun.clone(), &all, of, &plan.options, progress)?;
+        Ok(Self { plan_id: plan.id(), steps: steps.clone(), settled })
     }
 
     /// Returns the number of Gaussians that are coded.
@@ -112,21 +94,7 @@ impl Coding {
     /// Returns an encoder that has coded nothing.
     pub(super) fn encoding(&self, plan: &Plan) -> Result<Encoding> {
         plan.check("coding", [self.plan_id], None)?;
-        let clock = Stopwatch::start();
-        let points_of_view = PointsOfView::new(&plan.options.points_of_view);
-        let (floor, stop) = (&self.floor, self.steps.stop);
-        let mut parameters = floor.parameters.clone();
-        parameters.factors[VALUES] *= self.value_step;
-        let coder = ChunkCoder::learned(
-            parameters,
-            points_of_view,
-            &self.atoms,
-            self.costs.clone(),
-            stop,
-            plan.options.tolerance,
-        )?;
-        let layering = self.steps.layering.clone();
-        Ok(Encoding::new((coder, self.atoms.clone()), layering, self.most_dc, clock))
+        self.settled.encoding(&plan.options, Stopwatch::start())
     }
 
     /// Codes the Gaussians of `bucket` that stay, with the bucket's own tables. `refit` fits them to pictures, if their base
@@ -151,12 +119,10 @@ impl Coding {
         let mut keys = bucket.keys();
         filter(&mut keys, &stays);
         filter(&mut sensitivities, &stays);
-        let free = self.steps.steps.classes_of(&sensitivities);
-        let classes = self.floor.classes(&free, &splats.geometry, &keys);
-        let gaussians = Gaussians { keys, classes, sensitivities };
-        let options = &plan.options;
-        let encoding = self.encoding(plan)?;
-        let mut quantised = Quantised::of_part(splats, options, gaussians, encoding, progress)?;
+        plan.check("coding", [self.plan_id], None)?;
+        let (gaussians, options, clock) = ((keys, sensitivities), &plan.options, Stopwatch::start());
+        let mut quantised =
+            self.settled.quantise(splats, gaussians, &self.steps.steps, options, clock, progress)?;
         let appearances = quantised.refitted(refit, &observation, progress)?;
         let (counts, chunks) = quantised.counted(appearances.as_deref(), progress)?;
         let tables = tables::Tables::of(&counts)?;

@@ -8,7 +8,7 @@ use super::bucket::{Bucket, BucketReader};
 use super::message::messages;
 use super::plan::{Piece, Plan};
 use crate::packed::bitstream::PointsOfView;
-use crate::packed::encode::fit::{ColourMoments, Derivatives};
+use crate::packed::encode::fit::StepSums;
 use crate::packed::encode::octaves::{Histogram, RoundedSensitivities};
 use crate::packed::encode::pack::check;
 use crate::packed::encode::quantised::Observation;
@@ -46,14 +46,9 @@ pub struct LookStatistics {
     pub(super) gaussians: u64,
     /// Number of Gaussians that stay.
     pub(super) kept: u64,
-    /// Histogram of the sensitivities to the colour.
-    pub(super) colour: Histogram,
-    /// Histogram of the sensitivities to the logarithm of the opacity.
-    pub(super) opacity: Histogram,
+    pub(super) sums: StepSums,
     /// Histogram of the sensitivities to the logarithm of the opacity, of the Gaussians that stay.
     pub(super) energies: Histogram,
-    pub(super) colours: ColourMoments,
-    pub(super) derivatives: Derivatives,
 }
 
 messages!(Looked => "looked", LookStatistics => "look statistics");
@@ -111,21 +106,13 @@ impl LookStatistics {
             bucket: bucket.number,
             gaussians: splats.len() as u64,
             kept: stays.iter().filter(|&&stays| stays).count() as u64,
-            colour: Histogram::default(),
-            opacity: Histogram::default(),
+            sums: StepSums::default(),
             energies: Histogram::default(),
-            colours: ColourMoments::default(),
-            derivatives: Derivatives::default(),
         };
-        for (AppearanceSensitivity { colour, opacity }, stays) in looked.sensitivities.iter().zip(&stays) {
-            out.colour.add(colour);
-            out.opacity.add(opacity);
-            if *stays {
-                out.energies.add(opacity);
-            }
-        }
-        out.colours.add(&PointsOfView::new(&plan.options.points_of_view).colours(splats));
-        out.derivatives.add(&splats.geometry, found, &bucket.keys());
+        let dc = PointsOfView::new(&plan.options.points_of_view).colours(splats);
+        out.sums.add(&splats.geometry, &dc, found, &bucket.keys(), looked.sensitivities.iter());
+        let kept = looked.sensitivities.iter().zip(&stays).filter(|(_, stays)| **stays);
+        kept.for_each(|(own, _)| out.energies.add(own.opacity));
         (out, looked)
     }
 
@@ -133,11 +120,8 @@ impl LookStatistics {
     pub(super) fn merge(&mut self, next: &Self) {
         self.gaussians += next.gaussians;
         self.kept += next.kept;
-        self.colour.merge(&next.colour);
-        self.opacity.merge(&next.opacity);
+        self.sums.merge(&next.sums);
         self.energies.merge(&next.energies);
-        self.colours.merge(&next.colours);
-        self.derivatives.merge(&next.derivatives);
     }
 }
 

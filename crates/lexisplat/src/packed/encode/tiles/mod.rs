@@ -38,6 +38,7 @@ mod tests;
 pub use assembly::{Assembly, PackedFile};
 pub use bucket::{Bucket, BucketReader};
 pub use coding::{Coded, Coding, Counts, Tables};
+#[cfg(test)]
 pub(crate) use look::SHOWN;
 pub use look::{LookStatistics, Looked};
 pub use plan::Plan;

@@ -85,6 +85,8 @@ impl Plan {
         let mut guessed_total = 0.0;
         let mut looked: Vec<(usize, Vec3, u64)> = Vec::new();
         let mut total = 0_u64;
+        // Of all tiles one of as many rows counts.
+        let stride = tiles.iter().flat_map(|tile| &tile.1).map(|block| block.stride).max().unwrap_or(1);
         for (number, (name, blocks)) in tiles.iter().enumerate() {
             let Some(first) = blocks.first() else {
                 return Err(Error::malformed(name, "the tile has no Gaussians"));
@@ -93,7 +95,7 @@ impl Plan {
             kind.get_or_insert_with(|| first.kind.clone()).meta.join(&first.kind.meta);
             for block in blocks {
                 let from = first.kind.meta.offset;
-                for &(row, mut position) in &block.positions {
+                for &(row, mut position) in block.positions.iter().step_by(stride / block.stride.max(1)) {
                     shift(std::slice::from_mut(&mut position), from, offset);
                     looked.push((number, position, total + u64::from(row)));
                 }

@@ -1,6 +1,5 @@
 //! A sample of the Gaussians of a group of buckets, from which predictors and the dictionary are found.
 
-use half::f16;
 use serde::{Deserialize, Serialize};
 
 use super::bucket::Bucket;
@@ -10,13 +9,11 @@ use super::plan::Plan;
 use super::steps::Steps;
 use crate::packed::bitstream::PointsOfView;
 use crate::packed::curve::MortonKey;
-use crate::packed::encode::coder::{OrderedGaussians, SAMPLE, SAMPLE_STREAM};
-use crate::packed::encode::fit::Predictors;
-use crate::packed::encode::octaves::Histogram;
+use crate::packed::encode::coder::SAMPLE;
+use crate::packed::encode::sample_sums::SampleSums;
 use crate::scene::sensitivity::AppearanceSensitivity;
-use crate::scene::splats::Splats;
+use crate::scene::splats::{Splats, filter};
 use crate::support::error::{Error, Result};
-use crate::support::rng::SplitMix64;
 
 /// Approximate number of Gaussians to which predictors are fitted.
 const FITTED: usize = 1 << 19;
@@ -44,16 +41,7 @@ struct BucketSample {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SampleStatistics {
     plan_id: u32,
-    pub(super) predictors: Predictors,
-    /// Most octaves by which the shape of a Gaussian asks for smaller steps than those of class 0.
-    pub(super) over: f32,
-    /// Histogram of the largest coordinate of each base colour.
-    pub(super) dc: Histogram,
-    /// Rows in units of their value steps, as bytes of 16-bit floats. They differ from the exact rows by far less than a
-    /// step.
-    rows: Vec<u8>,
-    /// The colour class of each row.
-    classes: Vec<u8>,
+    sums: SampleSums,
 }
 
 messages!(SampleStatistics => "sample statistics");
@@ -101,104 +89,36 @@ impl Sample {
     /// [`Error::Parameter`] if `steps` are of another scene.
     pub fn statistics(&self, plan: &Plan, steps: &Steps) -> Result<SampleStatistics> {
         plan.check("steps", [steps.plan_id], None)?;
-        let mut out = SampleStatistics::none(plan);
+        let mut sums = SampleSums::default();
         let points_of_view = PointsOfView::new(&plan.options.points_of_view);
-        let parameters = &steps.floor.parameters;
-        for bucket in &self.buckets {
-            let dc = points_of_view.colours(&bucket.splats);
-            let classes = steps.steps.classes_of(&bucket.sensitivities);
-            out.predictors.add(&bucket.splats.geometry, &dc, &bucket.keys, &classes, parameters);
-            let kept: Vec<MortonKey> = bucket.kept().map(|i| bucket.keys[i]).collect();
-            out.over = out.over.max(steps.floor.over(&bucket.splats.geometry, &kept));
-            for dc in &dc {
-                let largest = parameters.dc_coordinates(*dc).into_iter();
-                out.dc.add(largest.fold(0.0_f32, |most, x| most.max(x.abs())));
-            }
-        }
-        self.add_rows(&mut out, plan, steps);
-        Ok(out)
-    }
-
-    /// Adds rows to learn the dictionary from. The number of rows of each bucket is proportional to the Gaussians of it
-    /// that stay.
-    fn add_rows(&self, out: &mut SampleStatistics, plan: &Plan, steps: &Steps) {
         let kept = |bucket: usize| steps.kept.get(bucket).copied().unwrap_or(0) as f64;
         let sampled = (0..plan.groups()).flat_map(|group| plan.group(group));
         let all_kept = sampled.map(kept).sum::<f64>().max(1.0);
-        let parameters = steps.floor.parameters.for_learning();
-        for bucket in &self.buckets {
-            let keys: Vec<MortonKey> = bucket.kept().map(|i| bucket.keys[i]).collect();
-            let sensitivities: Vec<_> = bucket.kept().map(|i| bucket.sensitivities[i]).collect();
-            let free = steps.steps.classes_of(&sensitivities);
-            let classes = steps.floor.classes(&free, &bucket.splats.geometry, &keys);
-            let ordered = OrderedGaussians::new(&bucket.splats, &keys, &classes);
-            let share = kept(bucket.number) / all_kept;
+        for BucketSample { number, splats, keys, sensitivities, stays } in &self.buckets {
+            let dc = points_of_view.colours(splats);
+            sums.add_values(&splats.geometry, &dc, keys, sensitivities, &steps.steps);
+            let (mut keys, mut sensitivities) = (keys.clone(), sensitivities.clone());
+            filter(&mut keys, stays);
+            filter(&mut sensitivities, stays);
+            // The number of rows of each bucket is proportional to the Gaussians of it that stay.
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share")]
-            let wanted = (SAMPLE as f64 * share).round() as usize;
-            let seed = plan.options.seed ^ SAMPLE_STREAM ^ bucket.number as u64;
-            let chosen = SplitMix64::new(seed).shuffled(keys.len()).take(wanted);
-            let (rows, mut classes) = ordered.scaled(chosen, &parameters);
-            out.rows.extend(rows.into_iter().flat_map(half_bytes));
-            out.classes.append(&mut classes);
+            let wanted = (SAMPLE as f64 * kept(*number) / all_kept).round() as usize;
+            let seed = plan.options.seed ^ *number as u64;
+            sums.add_kept(splats, &keys, &sensitivities, (&steps.steps, &steps.begun), (wanted, seed));
         }
-    }
-}
-
-/// Returns the bytes of the finite 16-bit float nearest to `x`.
-fn half_bytes(x: f32) -> [u8; 2] {
-    let most = f16::MAX.to_f32();
-    f16::from_f32(x.clamp(-most, most)).to_le_bytes()
-}
-
-impl BucketSample {
-    fn kept(&self) -> impl Iterator<Item = usize> {
-        (0..self.keys.len()).filter(|&i| self.stays[i])
+        Ok(SampleStatistics { plan_id: plan.id(), sums })
     }
 }
 
 impl SampleStatistics {
-    fn none(plan: &Plan) -> Self {
-        Self {
-            plan_id: plan.id(),
-            predictors: Predictors::default(),
-            over: 0.0,
-            dc: Histogram::default(),
-            rows: Vec::new(),
-            classes: Vec::new(),
-        }
-    }
-
     /// Returns the sums and the rows of all groups, which are in order.
-    pub(super) fn sum(plan: &Plan, groups: &[Self]) -> Result<Self> {
+    pub(super) fn sum(plan: &Plan, groups: &[Self]) -> Result<SampleSums> {
         plan.check("sample statistics", groups.iter().map(|group| group.plan_id), Some(plan.groups()))?;
-        let mut out = Self::none(plan);
-        for group in groups {
-            out.predictors.merge(&group.predictors);
-            out.over = out.over.max(group.over);
-            out.dc.merge(&group.dc);
-            out.rows.extend_from_slice(&group.rows);
-            out.classes.extend_from_slice(&group.classes);
+        let mut sums = SampleSums::default();
+        groups.iter().for_each(|group| sums.merge(&group.sums));
+        match sums.is_of(plan.kind.degree.rest()) {
+            true => Ok(sums),
+            false => Err(Error::parameter("sample statistics", "rows of other lengths", "rows of the scene")),
         }
-        let expected = out.classes.len() * plan.kind.degree.rest() * size_of::<f16>();
-        if out.rows.len() != expected {
-            return Err(Error::parameter(
-                "sample statistics",
-                out.rows.len(),
-                format!("{expected} bytes of rows"),
-            ));
-        }
-        Ok(out)
-    }
-
-    /// Returns the rows in random order, and their classes in the same order.
-    pub(super) fn shuffled(&self, plan: &Plan) -> (Vec<f32>, Vec<u8>) {
-        let bytes = plan.kind.degree.rest() * size_of::<f16>();
-        let (mut rows, mut classes) = (Vec::new(), Vec::new());
-        for i in SplitMix64::new(plan.options.seed ^ SAMPLE_STREAM).shuffled(self.classes.len()) {
-            let row = self.rows[i * bytes..(i + 1) * bytes].chunks_exact(size_of::<f16>());
-            rows.extend(row.map(|x| f16::from_le_bytes([x[0], x[1]]).to_f32()));
-            classes.push(self.classes[i]);
-        }
-        (rows, classes)
     }
 }

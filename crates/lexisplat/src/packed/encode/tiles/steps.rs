@@ -5,12 +5,8 @@ use serde::{Deserialize, Serialize};
 use super::look::LookStatistics;
 use super::message::messages;
 use super::plan::Plan;
-use crate::packed::bitstream::parameters::ColourAndShape;
-use crate::packed::encode::codebook::StopRule;
-use crate::packed::encode::coder::promise;
-use crate::packed::encode::fit::{self, Classes};
-use crate::packed::encode::floor::Floor;
-use crate::packed::encode::layering::Layering;
+use crate::packed::encode::fit;
+use crate::packed::encode::settled::Begun;
 use crate::support::error::{Error, Result};
 
 /// The steps of a scene, without predictors and without the dictionary.
@@ -18,10 +14,7 @@ use crate::support::error::{Error, Result};
 pub struct Steps {
     pub(super) plan_id: u32,
     pub(super) steps: fit::Steps,
-    /// The limits of steps, without those that depend on the shapes of Gaussians.
-    pub(super) floor: Floor,
-    pub(super) layering: Layering,
-    pub(super) stop: StopRule,
+    pub(super) begun: Begun,
     /// Number of Gaussians of each bucket that stay.
     pub(super) kept: Vec<u64>,
     /// Numbers of the buckets whose first Gaussian stays although it is not worth its bits. If no Gaussian of a file would
@@ -52,25 +45,11 @@ impl Steps {
                 kept[bucket] = 1;
             }
         }
-        let classes = ColourAndShape {
-            colour: Classes::of_histogram(&all.colour),
-            shape: Classes::of_histogram(&all.opacity),
-        };
-        let steps = fit::Steps::new(&plan.grid, classes, all.colours.axes(), &all.derivatives);
-        let mut parameters = steps.with_step(plan.step);
-        let stop = promise(&mut parameters, plan.options.tolerance);
+        let steps = fit::Steps::new(&plan.grid, &all.sums);
         let of_file = kept.iter().sum::<u64>() / plan.files().len().max(1) as u64;
         let of_file = usize::try_from(of_file).unwrap_or(usize::MAX);
-        let layering = Layering::new(of_file, &plan.options, all.energies.iter());
-        Ok(Self {
-            plan_id: plan.id(),
-            steps,
-            floor: Floor::begin(parameters),
-            layering,
-            stop,
-            kept,
-            first_stays,
-        })
+        let begun = Begun::new(&steps, (plan.step, true), &plan.options, of_file, all.energies.iter());
+        Ok(Self { plan_id: plan.id(), steps, begun, kept, first_stays })
     }
 
     /// Returns the number of Gaussians of the scene that stay.

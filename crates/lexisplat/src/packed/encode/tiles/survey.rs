@@ -17,8 +17,10 @@ use crate::support::rng::SplitMix64;
 
 /// Most rows of a survey.
 pub const BLOCK: usize = 262_144;
-/// Number of rows for each kept position. The grid and the buckets depend on these positions.
-pub(super) const STRIDE: usize = 128;
+/// Largest number of rows for each kept position. The grid and the buckets depend on these positions.
+const MOST_STRIDE: usize = 128;
+/// Least number of positions that are kept of a tile with more rows. Of a tile of fewer rows all are kept.
+const LEAST_POSITIONS: usize = 65_536;
 /// Mixed into the seed with which rows are chosen.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
@@ -29,7 +31,9 @@ pub struct Survey {
     pub(super) bounds: Option<Bounds>,
     /// Sum of the guessed weights of all Gaussians of the block.
     pub(super) guessed_total: f64,
-    /// The number in the block, and the position, of one of every [`STRIDE`] rows.
+    /// Number of rows for each kept position: a power of two.
+    pub(super) stride: usize,
+    /// The number in the block, and the position, of one of every [`Self::stride`] rows.
     pub(super) positions: Vec<(u32, Vec3)>,
     pub(super) kind: TileKind,
 }
@@ -47,17 +51,19 @@ impl Survey {
         seed: u64,
         progress: &dyn Progress,
     ) -> Result<Self> {
+        let stride = stride(tile.len());
         let mut part = tile.empty();
         let mut survey = Self {
             gaussians: rows.len() as u64,
             bounds: None,
             guessed_total: 0.0,
-            positions: Vec::with_capacity(rows.len().div_ceil(STRIDE)),
+            stride,
+            positions: Vec::with_capacity(rows.len().div_ceil(stride)),
             kind: TileKind::of(&part),
         };
         let mut random = SplitMix64::new(seed ^ LOOK_STREAM ^ rows.start as u64);
-        let chosen = rows.clone().step_by(STRIDE);
-        let mut chosen = chosen.map(|row| row + random.below(STRIDE.min(rows.end - row))).peekable();
+        let chosen = rows.clone().step_by(stride);
+        let mut chosen = chosen.map(|row| row + random.below(stride.min(rows.end - row))).peekable();
         each_part(tile, rows.clone(), &mut part, progress, &mut |start, part| {
             let (own, geometry) = (start..start + part.len(), &part.geometry);
             let bounds = Bounds::of(&geometry.positions);
@@ -93,4 +99,9 @@ impl Survey {
     pub fn is_empty(&self) -> bool {
         self.gaussians == 0
     }
+}
+
+/// Returns the number of rows for each kept position of a tile of `rows` rows.
+fn stride(rows: usize) -> usize {
+    1 << (rows / LEAST_POSITIONS).max(1).ilog2().min(MOST_STRIDE.ilog2())
 }
