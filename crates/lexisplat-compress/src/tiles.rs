@@ -7,7 +7,6 @@ use lexisplat_render::Renderer;
 
 use crate::effort::Refine;
 use crate::error::Result;
-pub use crate::parts::in_parts;
 use crate::parts::{Parts, refit};
 use crate::report::RefineReport;
 

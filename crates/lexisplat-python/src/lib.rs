@@ -48,7 +48,7 @@ mod _native {
     #[pymodule_export]
     use crate::tiles::{
         TileSample, tile_assemble, tile_check, tile_choices, tile_code, tile_coding, tile_finish, tile_look,
-        tile_open, tile_plan, tile_runs, tile_scatter, tile_steps, tile_survey, tile_tables, tile_whole,
+        tile_open, tile_plan, tile_runs, tile_scatter, tile_steps, tile_survey, tile_tables,
     };
     use pyo3::prelude::*;
 

@@ -9,7 +9,7 @@ use lexisplat::packed::tiles::{
     SampleStatistics, Steps, Survey, Tables,
 };
 use lexisplat::ply::ReadOptions;
-use lexisplat::{Joined, Silent, SplatSource, Splats};
+use lexisplat::{Silent, SplatSource, Splats};
 use lexisplat_compress::{CompressionReport, Error, Quality, Refine, RefineReport, Target, tiles};
 use lexisplat_render::{Device, Renderer};
 use pyo3::prelude::*;
@@ -492,41 +492,6 @@ pub(crate) fn tile_assemble(
     report.source_bytes = source_bytes;
     report.refined = RefineReport::of_parts(results);
     json(py, &report)
-}
-
-/// Packs all tiles in this process. Returns the file, and its report as JSON.
-#[pyfunction]
-#[pyo3(signature = (tiles, choices, limit))]
-pub(crate) fn tile_whole(
-    py: Python<'_>,
-    tiles: Vec<Named<'_>>,
-    choices: Choices,
-    limit: Option<&Bound<'_, PyDict>>,
-) -> PyResult<(Made, String)> {
-    let options = choices.reading(py, limit)?;
-    let device = device(py, &choices.device)?;
-    let given = tiles.into_iter().map(Tile::of).collect::<PyResult<Vec<_>>>()?;
-    let (bytes, report) = without_gil(py, None, move |watch| {
-        let (mut scenes, mut bytes) = (Vec::new(), 0);
-        for tile in &given {
-            let scene = tile.with(&options, &mut |source| {
-                bytes += source.source_bytes();
-                Ok(source.whole()?.into_owned())
-            })?;
-            scenes.push((tile.name.clone(), scene));
-        }
-        let named: Vec<(String, &dyn SplatSource)> =
-            scenes.iter().map(|(name, scene)| (name.clone(), scene as &dyn SplatSource)).collect();
-        let joined = Joined::new(&named)?;
-        let mut file = Vec::new();
-        let renderer = choices.renderer(device)?;
-        let (options, decibels) = (choices.options(), choices.decibels()?);
-        let (refine, sink) = (choices.effort()?, (&mut file).into());
-        let mut report = tiles::in_parts(&options, decibels, refine, renderer, &joined, sink, watch)?;
-        report.source_bytes = bytes;
-        Ok((file, report))
-    })?;
-    Ok((made(py, bytes), json(py, &report)?))
 }
 
 /// Returns an error for choices that are out of range, before any work.

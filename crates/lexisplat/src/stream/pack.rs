@@ -19,8 +19,8 @@ use crate::support::stopwatch::Stopwatch;
 /// Packs the scene of `source` so that its pictures have a PSNR of about `decibels` dB, and writes it to `sink`.
 ///
 /// A scene is packed [bucket by bucket](crate::packed::tiles). `observer` draws each bucket, and steps, predictors and dictionary
-/// are found from sums over all buckets. Without an observer, the sensitivity is guessed from each Gaussian alone. A scene of one
-/// bucket has the bytes that [`Packer`] gives it, if all its rows were surveyed (scenes of less than 131,072 Gaussians).
+/// are found from sums over all buckets. Without an observer, the sensitivity is guessed from each Gaussian alone. A scene of at
+/// most [`BUCKET`] Gaussians is one bucket, and has the bytes that [`Packer`] gives it.
 ///
 /// The bytes are the same on any number of threads. They are also those that other processes make of the same tiles, which
 /// are the [parts](SplatSource::tiles) of `source`. Peak of anonymous memory is below 1.5 GiB at SH degree 3.

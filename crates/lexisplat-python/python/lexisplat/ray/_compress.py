@@ -198,11 +198,6 @@ class _Scene:
     def compressed(self, wanted: Sequence[str], overwrite: bool) -> dict[str, Any]:
         """Writes the files. Returns the report."""
         work = self._work
-        if sum(self._lengths) <= _native.TILE_BUCKET and not self._one_each:
-            file, report = work.results("pack", [work.start(tasks.whole, self.tiles, **self._drawing)])[0]
-            work.traffic["results"] += len(file)
-            _write(wanted[0], file, overwrite)
-            return {**json.loads(report), "output": wanted[0]}
         plan, gaussians, groups, files = _native.tile_plan(self._surveys, self._choices, self._one_each)
         self._surveys = []
         self._plan = work.shared(plan)
@@ -295,9 +290,3 @@ class _Scene:
         work.traffic["statistics"] += sum(map(len, found))
         work.tell("learn", 0, 1)
         return _native.tile_coding(plan, steps, found)
-
-
-def _write(path: str, file: bytes, overwrite: bool) -> None:
-    from .._scene import open as open_scene
-
-    open_scene(file).save(path, overwrite=overwrite)

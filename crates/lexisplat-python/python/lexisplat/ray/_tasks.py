@@ -118,13 +118,6 @@ def finish(context: Context, plan: bytes, coding: bytes, tables: bytes, coded: b
     return _native.tile_finish(plan, coding, tables, coded)
 
 
-def whole(context: Context, tiles: Sequence[Tile]) -> tuple[bytes, str]:
-    context.begin()
-    given = [_here(tile) for tile in tiles]
-    with quiet(context.choices["device"]):
-        return _native.tile_whole(given, context.choices, context.limit)
-
-
 def blocks(gaussians: int) -> Iterator[Rows]:
     """The blocks of rows of a tile. One without Gaussians has an empty one."""
     size = _native.TILE_BLOCK

@@ -9,14 +9,16 @@ use super::quantised::Quantised;
 use super::removal::Influence;
 use super::sample_sums::SampleSums;
 use super::settled::{Begun, Settled};
+use super::tiles::{Plan, surveyed};
 use crate::packed::bitstream::PointsOfView;
-use crate::packed::curve::{Grid, MortonKey};
+use crate::packed::curve::{Bounds, Grid, MortonKey};
 use crate::packed::scene::Packed;
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::{Splats, all_finite};
 use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
+use crate::support::maths::Vec3;
 use crate::support::progress::{Progress, Stage};
 use crate::support::stopwatch::Stopwatch;
 
@@ -52,7 +54,9 @@ impl<S: Borrow<Splats>> Packer<S> {
         check(splats.borrow(), sensitivity)?;
         options.check()?;
         let g = &splats.borrow().geometry;
-        let grid = Grid::fit(&g.positions);
+        let surveyed = Plan::blocks(g.len()).flat_map(|rows| surveyed(g.len(), rows, options.seed));
+        let sample: Vec<Vec3> = surveyed.map(|row| g.positions[row]).collect();
+        let grid = Grid::fit_sample(&sample, Bounds::of(&g.positions), g.len());
         let mut keys = grid.keys(g);
         keys.sort_unstable();
         let influence = Influence::new(g, sensitivity, &keys, options.may_change());

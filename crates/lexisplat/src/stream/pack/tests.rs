@@ -75,7 +75,7 @@ fn streamed_with(
     done.map(|done| (std::fs::read(output).unwrap(), done))
 }
 
-/// If all Gaussians are in one bucket and were surveyed, no step can find other values than the packer.
+/// If all Gaussians are in one bucket, no step finds other values than the packer.
 #[test]
 fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
     for count in [MOST_CHUNK + 500, 700, 0] {

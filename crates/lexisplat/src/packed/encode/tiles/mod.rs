@@ -44,6 +44,7 @@ pub use look::{LookStatistics, Looked};
 pub use plan::Plan;
 pub use sample::{Sample, SampleStatistics};
 pub use steps::Steps;
+pub(in crate::packed) use survey::surveyed;
 pub use survey::{BLOCK, Survey};
 
 /// Approximate number of Gaussians of a bucket. A step that takes one bucket needs about 600 MB of memory at SH degree 3.

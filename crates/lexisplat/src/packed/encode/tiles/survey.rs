@@ -19,8 +19,8 @@ use crate::support::rng::SplitMix64;
 pub const BLOCK: usize = 262_144;
 /// Largest number of rows for each kept position. The grid and the buckets depend on these positions.
 const MOST_STRIDE: usize = 128;
-/// Least number of positions that are kept of a tile with more rows. Of a tile of fewer rows all are kept.
-const LEAST_POSITIONS: usize = 65_536;
+/// Least number of positions that are kept of a tile. Of a tile of fewer rows all are kept.
+const LEAST_POSITIONS: usize = 8192;
 /// Mixed into the seed with which rows are chosen.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
@@ -51,19 +51,16 @@ impl Survey {
         seed: u64,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let stride = stride(tile.len());
         let mut part = tile.empty();
         let mut survey = Self {
             gaussians: rows.len() as u64,
             bounds: None,
             guessed_total: 0.0,
-            stride,
-            positions: Vec::with_capacity(rows.len().div_ceil(stride)),
+            stride: stride(tile.len()),
+            positions: Vec::new(),
             kind: TileKind::of(&part),
         };
-        let mut random = SplitMix64::new(seed ^ LOOK_STREAM ^ rows.start as u64);
-        let chosen = rows.clone().step_by(stride);
-        let mut chosen = chosen.map(|row| row + random.below(stride.min(rows.end - row))).peekable();
+        let mut chosen = surveyed(tile.len(), rows.clone(), seed).peekable();
         each_part(tile, rows.clone(), &mut part, progress, &mut |start, part| {
             let (own, geometry) = (start..start + part.len(), &part.geometry);
             let bounds = Bounds::of(&geometry.positions);
@@ -99,6 +96,13 @@ impl Survey {
     pub fn is_empty(&self) -> bool {
         self.gaussians == 0
     }
+}
+
+/// Returns the rows whose positions are kept of the block `rows` of a tile of `all` rows.
+pub(in crate::packed) fn surveyed(all: usize, rows: Range<usize>, seed: u64) -> impl Iterator<Item = usize> {
+    let (stride, end) = (stride(all), rows.end);
+    let mut random = SplitMix64::new(seed ^ LOOK_STREAM ^ rows.start as u64);
+    rows.step_by(stride).map(move |row| row + random.below(stride.min(end - row)))
 }
 
 /// Returns the number of rows for each kept position of a tile of `rows` rows.
