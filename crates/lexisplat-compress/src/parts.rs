@@ -18,12 +18,12 @@ use crate::refit::{Fit, GAIN_FOUND, refined};
 use crate::report::{CompressionReport, RefineReport};
 use crate::target::Target;
 
-/// Packs part by part to a PSNR of about `decibels`. A scene that is one part is packed whole. `renderer` draws the parts, which
+/// Packs part by part to a PSNR of about `decibels`. `renderer` draws the parts, which
 /// are refined if there is `refine`. If `renderer` is `None`, the sensitivity is guessed.
 ///
 /// # Errors
 /// As [`stream::pack`], and errors of drawing.
-pub fn in_parts(
+pub(crate) fn in_parts(
     options: &PackOptions,
     decibels: f64,
     refine: Option<Refine>,
