@@ -16,7 +16,7 @@ const VARIABLE: &str = "LEXISPLAT_SIMD";
 const THREADS: [&str; 3] = ["1", "2", "7"];
 /// Gaussians of the larger scene: three units of work, so that threads share them.
 const MANY: usize = 5000;
-/// Gaussians of a scene that is packed in parts: more than of the largest that is packed as a whole.
+/// Gaussians of a scene that is packed in parts: more than one bucket.
 const LARGE: usize = 270_000;
 /// Gaussians of the scene whose pictures are drawn again and again.
 const FEW: usize = 300;

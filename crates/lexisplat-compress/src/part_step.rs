@@ -6,16 +6,18 @@ use lexisplat_render::{Camera, Renderer, Scene};
 
 use crate::error::Result;
 use crate::judge::{Judge, Score};
-use crate::target::{DB_PER_HALVING, Try, next_step, on_grid};
+use crate::target::{DB_PER_HALVING, Try, on_grid};
 
-/// Number of steps in an octave at which files are made.
+/// Number of steps in an octave. Scores of one small scene in two units differ by up to 1 dB, which is a fifth of an
+/// octave. Finer steps would therefore often differ too.
 const STEPS_PER_OCTAVE: f64 = 2.0;
-/// Number of steps in an octave from which the step of the part is chosen.
-const CHOSEN_PER_OCTAVE: f64 = 8.0;
 /// Largest number of files made.
 const MOST_FILES: usize = 4;
 /// Views that are evenly spread over a part may show less than views like photographs by this many decibels.
 const EVEN_MARGIN: f64 = 1.0;
+/// Factor on the amount by which a file falls short of the quality, beside the amount by which another one exceeds it. A loss that
+/// nobody asked for is worse than bytes that nobody needs.
+const SHORT_WEIGHT: f64 = 2.0;
 /// Largest change of the binary logarithm of the step after one file.
 const MOST_MOVE: f64 = 2.0;
 
@@ -61,11 +63,12 @@ impl PartJudge {
     }
 }
 
-/// Returns the overall step with which a file of `packer`, which packs a part of a scene, is expected to have `decibels` dB by
-/// `judge` before it is refitted. The search begins at step `begin`.
+/// Returns the overall step with which a file of `packer`, which packs a part of a scene, has about `decibels` dB by `judge` before
+/// it is refitted. The search begins at step `begin`.
 ///
-/// The score at one step gives the next step, until that step was tried before. The step then lies on the line through the two
-/// tries around `decibels`, or else at the usual slope from the nearest try, and is rounded to the smaller step.
+/// The score at one step gives the next step, until that step was tried before. The step of the file whose score is nearest to
+/// `decibels` is chosen; falling short counts [`SHORT_WEIGHT`] times. With a second file that is refitted, and steps of quarter
+/// octaves, three copies of room-large in five parts had the same steps, in 27 % more time.
 ///
 /// # Errors
 /// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -90,8 +93,9 @@ pub(crate) fn part_step(
         }
         log_step = next;
     }
-    let expected = next_step(&tries, decibels, &mut -DB_PER_HALVING).unwrap_or(log_step);
-    Ok(libm::exp2((expected * CHOSEN_PER_OCTAVE).floor() / CHOSEN_PER_OCTAVE))
+    let off = |t: &Try| (t.value - decibels).max(SHORT_WEIGHT * (decibels - t.value));
+    let nearest = tries.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+    Ok(libm::exp2(nearest.map_or(log_step, |t| t.log_step)))
 }
 
 #[cfg(test)]

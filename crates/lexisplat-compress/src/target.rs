@@ -454,7 +454,7 @@ pub(crate) fn pack_to_target(
 
 /// Returns the binary logarithm of the next step to try, within [`STEPS`]. It lies on the line through the two tries around
 /// the wanted value, or else beyond the last try. Returns `None` if that step was tried before.
-pub(crate) fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
+fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
     // Values need not change evenly with the step: one step may change a view by decibels. Some tries meet the wanted
     // value, and some miss it. The neighbours at the border between the two count.
     let towards_below = -slope.signum();

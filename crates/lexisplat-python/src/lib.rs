@@ -55,7 +55,6 @@ mod _native {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-        module.add("TILE_BLOCK", lexisplat::packed::tiles::BLOCK)?;
-        module.add("TILE_BUCKET", lexisplat::packed::tiles::BUCKET)
+        module.add("TILE_BLOCK", lexisplat::packed::tiles::BLOCK)
     }
 }

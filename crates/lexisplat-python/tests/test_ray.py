@@ -24,7 +24,7 @@ ray = pytest.importorskip("ray")
 import lexisplat.ray  # noqa: E402
 from lexisplat.ray import _compress  # noqa: E402
 
-#: Gaussians of a tile. Four of them are more than a scene that is packed as a whole.
+#: Gaussians of a tile. Four of them are more than one bucket.
 TILE = 70_000
 #: Options that make the tests fast.
 FAST: dict[str, Any] = {"guess": True, "keep_order": True}

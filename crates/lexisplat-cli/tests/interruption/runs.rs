@@ -26,7 +26,7 @@ pub(crate) const JOBS: [&[&str]; 4] = [
 
 /// A scene that is packed in parts, which [`in_parts`] adds.
 pub(crate) const IN_PARTS: [&str; 5] = ["compress", "large.ply", "--guess", "-o", OUTPUT];
-/// Gaussians of that scene: more than of the largest that is packed as a whole.
+/// Gaussians of that scene: more than one bucket.
 const LARGE: usize = 270_000;
 
 /// Adds a scene to `folder` that is packed in parts.

@@ -145,7 +145,6 @@ def encode_rows(
 
 # The steps of packing in tiles. Bytes pass between them.
 TILE_BLOCK: int
-TILE_BUCKET: int
 
 _Rows = tuple[int, int]
 _Limit = dict[str, int] | None
