@@ -104,7 +104,7 @@ describe('the page of the viewer', { skip: !npm && 'LEXISPLAT_NPM is not set' },
     assert.deepEqual((await calls(page, 'key')).map((call) => call[1]), [']', '3', '+', 'r']);
     assert.deepEqual((await calls(page, 'run')).at(-1), ['run', 'orbit=5:0']);
     const flights = await calls(page, 'fly');
-    assert.ok(flights.every(([, x, y, forward]) => x === 0 && y === 0 && forward > 0), JSON.stringify(flights));
+    assert.ok(flights.length > 0 && flights.every(([, x, y, forward]) => x === 0 && y === 0 && forward > 0), JSON.stringify(flights));
     await rest();
     assert.equal((await calls(page, 'fly')).length, flights.length, 'a flight ends with its key');
     await page.keyboard.press('h');

@@ -51,7 +51,7 @@ impl Floor {
     }
 
     /// Sets the limits of colours and of logarithms, which do not depend on the shapes of Gaussians. Also shifts the steps so that
-    /// those of some class are exactly these limits.
+    /// the steps of some class are exactly these limits.
     pub(in crate::packed) fn begin(mut parameters: Parameters) -> Self {
         // If a limit were between two classes, all Gaussians at it would change their steps at once as the overall step
         // grows.

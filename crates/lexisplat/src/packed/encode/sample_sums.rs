@@ -1,4 +1,4 @@
-//! Sums over a sample of the Gaussians of a scene: what predictors, limits and the dictionary are found from.
+//! Sums over a sample of the Gaussians of a scene, from which predictors, limits and the dictionary are found.
 
 use half::f16;
 use serde::{Deserialize, Serialize};

@@ -21,7 +21,7 @@ use crate::support::error::Result;
 use crate::support::progress::Progress;
 use crate::support::stopwatch::Stopwatch;
 
-/// What is settled before a sample is taken.
+/// The choices that are made before a sample is taken.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::packed) struct Begun {
     /// The limits of steps, without those that depend on the shapes of Gaussians.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::message::messages;
-use super::survey::{BLOCK, Survey};
+use super::survey::{BLOCK, Survey, stride};
 use super::{BUCKET, message};
 use crate::packed::curve::{Bounds, Grid, MortonKey};
 use crate::packed::encode::options::PackOptions;
@@ -85,17 +85,18 @@ impl Plan {
         let mut guessed_total = 0.0;
         let mut looked: Vec<(usize, Vec3, u64)> = Vec::new();
         let mut total = 0_u64;
-        // Of all tiles one of as many rows counts.
-        let stride = tiles.iter().flat_map(|tile| &tile.1).map(|block| block.stride).max().unwrap_or(1);
+        // A position of any tile stands for the same number of rows.
+        let common = tiles.iter().map(|(_, blocks)| stride(rows(blocks))).max().unwrap_or(1);
         for (number, (name, blocks)) in tiles.iter().enumerate() {
             let Some(first) = blocks.first() else {
                 return Err(Error::malformed(name, "the tile has no Gaussians"));
             };
             first.kind.check(name, kind.as_ref(), first.gaussians)?;
             kind.get_or_insert_with(|| first.kind.clone()).meta.join(&first.kind.meta);
+            let every = common / stride(rows(blocks));
             for block in blocks {
                 let from = first.kind.meta.offset;
-                for &(row, mut position) in block.positions.iter().step_by(stride / block.stride.max(1)) {
+                for &(row, mut position) in block.positions.iter().step_by(every) {
                     shift(std::slice::from_mut(&mut position), from, offset);
                     looked.push((number, position, total + u64::from(row)));
                 }
@@ -406,12 +407,14 @@ impl Piece {
     }
 }
 
+/// Returns the number of rows of a tile of these blocks.
+fn rows(blocks: &[Survey]) -> u64 {
+    blocks.iter().map(|block| block.gaussians).fold(0, u64::saturating_add)
+}
+
 /// Returns the offset of the scene of `tiles`. Joining the same tiles gives the same offset.
 fn shared_offset(tiles: &[(String, Vec<Survey>)]) -> Option<Offset> {
-    let of = |blocks: &Vec<Survey>| {
-        let gaussians = blocks.iter().map(|block| block.gaussians).fold(0, u64::saturating_add);
-        Some((blocks.first()?.kind.meta.offset, gaussians))
-    };
+    let of = |blocks: &Vec<Survey>| Some((blocks.first()?.kind.meta.offset, rows(blocks)));
     let offsets: Vec<_> = tiles.iter().filter_map(|(_, blocks)| of(blocks)).collect();
     Offset::shared(&offsets)
 }

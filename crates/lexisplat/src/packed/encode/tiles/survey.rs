@@ -19,8 +19,9 @@ use crate::support::rng::SplitMix64;
 pub const BLOCK: usize = 262_144;
 /// Largest number of rows for each kept position. The grid and the buckets depend on these positions.
 const MOST_STRIDE: usize = 128;
-/// Least number of positions that are kept of a tile. Of a tile of fewer rows all are kept.
-const LEAST_POSITIONS: usize = 8192;
+/// Least number of positions that are kept of a tile. Of a tile of less than twice as many rows all are kept. More gain
+/// nothing (docs/METHOD.md, "More positions").
+const LEAST_POSITIONS: u64 = 8192;
 /// Mixed into the seed with which rows are chosen.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
@@ -31,9 +32,7 @@ pub struct Survey {
     pub(super) bounds: Option<Bounds>,
     /// Sum of the guessed weights of all Gaussians of the block.
     pub(super) guessed_total: f64,
-    /// Number of rows for each kept position: a power of two.
-    pub(super) stride: usize,
-    /// The number in the block, and the position, of one of every [`Self::stride`] rows.
+    /// The number in the block, and the position, of one of every [`stride`] rows.
     pub(super) positions: Vec<(u32, Vec3)>,
     pub(super) kind: TileKind,
 }
@@ -56,7 +55,6 @@ impl Survey {
             gaussians: rows.len() as u64,
             bounds: None,
             guessed_total: 0.0,
-            stride: stride(tile.len()),
             positions: Vec::new(),
             kind: TileKind::of(&part),
         };
@@ -100,12 +98,12 @@ impl Survey {
 
 /// Returns the rows whose positions are kept of the block `rows` of a tile of `all` rows.
 pub(in crate::packed) fn surveyed(all: usize, rows: Range<usize>, seed: u64) -> impl Iterator<Item = usize> {
-    let (stride, end) = (stride(all), rows.end);
+    let (stride, end) = (stride(all as u64), rows.end);
     let mut random = SplitMix64::new(seed ^ LOOK_STREAM ^ rows.start as u64);
     rows.step_by(stride).map(move |row| row + random.below(stride.min(end - row)))
 }
 
-/// Returns the number of rows for each kept position of a tile of `rows` rows.
-fn stride(rows: usize) -> usize {
+/// Returns the number of rows for each kept position of a tile of `rows` rows: a power of two.
+pub(super) fn stride(rows: u64) -> usize {
     1 << (rows / LEAST_POSITIONS).max(1).ilog2().min(MOST_STRIDE.ilog2())
 }
